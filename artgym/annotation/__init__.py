@@ -1,0 +1,1 @@
+"""Grasp labels: candidate poses, a geometric filter, and one trial in physics each."""

@@ -1,0 +1,1 @@
+"""Labelled RGB-D samples: what one is, and the files they live in."""

@@ -1,0 +1,123 @@
+"""What one training sample is.
+
+A sample is one RGB-D view of one object on a table, together with everything that is known about
+the points of the object seen in it. Frames: ``camera`` is OpenCV; ``level`` shares the camera's
+origin but has z up and x in the viewing direction projected on the horizontal; ``part`` is the
+link's frame; ``object`` is the root link's frame. Grasp columns are (x, y = closing direction,
+z = approach).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artgym.errors import InvalidArgumentError
+from artgym.geometry.grasps import NUM_CANDIDATES
+
+#: Codes of ``Sample.joint_type``.
+JOINT_NONE, JOINT_PRISMATIC, JOINT_REVOLUTE = -1, 0, 1
+
+#: Codes of ``Sample.affordance``.
+AFFORDANCE_NO, AFFORDANCE_YES, AFFORDANCE_UNKNOWN = 0, 1, 255
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sample:
+    """One view of one object. M points seen, K parts (base = 0), G labelled surface points.
+
+    Attributes:
+        object_id: catalogue id, "laptop/0012".
+        rgb: uint8 (H, W, 3).
+        depth: float32 (H, W), metres along z, 0 where nothing was seen.
+        part_mask: uint8 (H, W): part index + 1, 0 elsewhere.
+        intrinsics: float32 (3, 3).
+        R_level_camera: float32 (3, 3), from the table's normal.
+        points_camera: float32 (M, 3), metres.
+        colors: uint8 (M, 3).
+        part: uint8 (M,), part index of each point.
+        npcs: float32 (M, 3) in [0, 1]: the point normalised in its own part's canonical box.
+        naocs: float32 (M, 3) in [0, 1]: the same in the object's box, the object in rest state.
+        affordance: uint8 (M,): 1 where some tried grasp succeeded, 0 where none did, 255 where no
+            labelled surface point lies near.
+        grasp_row: int32 (M,): the nearest labelled surface point of the same part, an index into
+            the four arrays below, -1 where none lies near.
+        grasp_bits: uint8 (G, C / 8): success of each of the C = ``NUM_CANDIDATES`` tries of
+            ``geometry.grasps.candidate_rotations``, ``np.unpackbits(..., bitorder="little")``.
+        grasp_points_part: float32 (G, 3): the labelled points, frame of their part, metres.
+        grasp_normals_part: float32 (G, 3): their outward unit normals, same frame.
+        grasp_part: uint8 (G,): the part each labelled point lies on.
+        T_camera_parts: float32 (K, 4, 4).
+        part_centers: float32 (K, 3) and part_scales: float32 (K,), part frame: NPCS is
+            ``(p - center) / scale + 0.5``, the scale being the canonical box's diagonal.
+        T_camera_object: float32 (4, 4), the root link.
+        T_object_rest_parts: float32 (K, 4, 4): part frames in the object's rest state.
+        object_center: float32 (3,) and object_scale: float32 (), the same for NAOCS.
+        joint_type: int8 (K,): -1 none (base), 0 prismatic, 1 revolute.
+        joint_axis_camera: float32 (K, 3), unit, opening direction positive; zeros for the base.
+        joint_pivot_camera: float32 (K, 3), metres.
+        open_fraction: float32 (K,), in [0, 1].
+    """
+
+    object_id: str
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    part_mask: NDArray[np.uint8]
+    intrinsics: NDArray[np.float32]
+    R_level_camera: NDArray[np.float32]
+    points_camera: NDArray[np.float32]
+    colors: NDArray[np.uint8]
+    part: NDArray[np.uint8]
+    npcs: NDArray[np.float32]
+    naocs: NDArray[np.float32]
+    affordance: NDArray[np.uint8]
+    grasp_row: NDArray[np.int32]
+    grasp_bits: NDArray[np.uint8]
+    grasp_points_part: NDArray[np.float32]
+    grasp_normals_part: NDArray[np.float32]
+    grasp_part: NDArray[np.uint8]
+    T_camera_parts: NDArray[np.float32]
+    part_centers: NDArray[np.float32]
+    part_scales: NDArray[np.float32]
+    T_camera_object: NDArray[np.float32]
+    T_object_rest_parts: NDArray[np.float32]
+    object_center: NDArray[np.float32]
+    object_scale: NDArray[np.float32]
+    joint_type: NDArray[np.int8]
+    joint_axis_camera: NDArray[np.float32]
+    joint_pivot_camera: NDArray[np.float32]
+    open_fraction: NDArray[np.float32]
+
+    @property
+    def num_parts(self) -> int:
+        """K, the base included."""
+        return len(self.joint_type)
+
+    def successful_tries(self) -> NDArray[np.bool_]:
+        """(G, C): whether each try at each labelled point succeeded."""
+        bits = np.unpackbits(self.grasp_bits, axis=1, count=NUM_CANDIDATES, bitorder="little")
+        return bits.astype(bool)
+
+
+#: The array fields of a sample, in order: what a file holds beside the object's id.
+ARRAY_FIELDS: tuple[str, ...] = tuple(f.name for f in fields(Sample) if f.name != "object_id")
+
+
+def level_from_camera(up_camera: ArrayLike) -> NDArray[np.float64]:
+    """``R_level_camera`` (3, 3) from the table's upward normal (3,) in the camera frame.
+
+    Raises:
+        InvalidArgumentError: the camera looks straight up or down, so that level's x is undefined.
+    """
+    z = np.asarray(up_camera, dtype=float)
+    z = z / np.linalg.norm(z)
+    x = np.array([0.0, 0.0, 1.0]) - z[2] * z
+    if np.linalg.norm(x) < 1e-3:
+        raise InvalidArgumentError(
+            f"up_camera={z.tolist()} is parallel to the viewing direction: the level frame has no "
+            "forward axis. Tilt the camera."
+        )
+    x = x / np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])

@@ -1,0 +1,56 @@
+"""Every error that artgym raises on purpose.
+
+Each message says what was expected, what came, and what to do about it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ArtgymError(Exception):
+    """Base of all errors raised on purpose by this package."""
+
+
+class InvalidArgumentError(ArtgymError, ValueError):
+    """A caller passed a value that cannot be used; the message names the argument."""
+
+
+class UnknownNameError(InvalidArgumentError):
+    """A name that is not in a table.
+
+    Args:
+        kind: what the name should have been ("category", "obs_mode", ...).
+        name: what came.
+        known: the names that would have worked.
+    """
+
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+        known = sorted(known)
+        nearest = difflib.get_close_matches(str(name), known, n=1, cutoff=0.0)
+        hint = f" Nearest: {nearest[0]!r}." if nearest else ""
+        shown = ", ".join(known[:12]) + (f", ... ({len(known)} in all)" if len(known) > 12 else "")
+        super().__init__(f"unknown {kind} {name!r}.{hint} Known: {shown}.")
+        self.kind = kind
+        self.name = name
+        self.nearest = nearest[0] if nearest else None
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (InvalidArgumentError, (str(self),))
+
+
+class RendererUnavailableError(ArtgymError, RuntimeError):
+    """No device can render; state and point-cloud observations still work."""
+
+
+class DamagedFileError(ArtgymError):
+    """A file of ours cannot be read as what it should be; the message names it."""
+
+
+class MissingDependencyError(ArtgymError, ImportError):
+    """A package or system library is missing; the message says how to install it."""
+
+
+class NotReadyError(ArtgymError, RuntimeError):
+    """A call came at the wrong time: before ``reset`` or after ``close``."""

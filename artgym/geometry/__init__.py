@@ -1,0 +1,1 @@
+"""Frames, rotations, cameras and joint motion, in plain numpy."""

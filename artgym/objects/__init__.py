@@ -1,0 +1,1 @@
+"""What an articulated object is, and where objects come from."""

@@ -1,0 +1,118 @@
+"""Cameras: where they stand, and pictures by the renderer.
+
+Pictures come in the OpenCV convention; depth is metres along z, 0 where nothing was seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import sapien
+from numpy.typing import NDArray
+
+from artgym.geometry.camera import intrinsics_from_fov, look_at
+from artgym.sim.conversion import R_SIMCAM_CAMERA, pose_from_transform
+
+Array = NDArray[np.floating]
+
+#: Nothing nearer or farther is seen, metres.
+NEAR, FAR = 0.05, 5.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """A camera in the world.
+
+    Attributes:
+        T_world_camera: its pose (4, 4), OpenCV axes.
+        fov_y: vertical field of view, radians.
+        width, height: of the picture, pixels.
+    """
+
+    T_world_camera: Array
+    fov_y: float
+    width: int
+    height: int
+
+    @property
+    def intrinsics(self) -> Array:
+        """(3, 3)."""
+        return intrinsics_from_fov(self.width, self.height, self.fov_y)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewDistribution:
+    """Where cameras stand: in front of the table, looking down at the object.
+
+    Attributes:
+        azimuth: about z from the world's x axis, radians.
+        elevation: above the horizontal, radians.
+        distance: from the point looked at, metres.
+        target: middle and half extent of the point looked at, metres.
+        fov_y: vertical field of view, radians.
+    """
+
+    azimuth: tuple[float, float] = (-0.7, 0.7)
+    elevation: tuple[float, float] = (0.45, 0.95)
+    distance: tuple[float, float] = (0.8, 1.1)
+    target: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (0.05, 0.0, 0.12),
+        (0.04, 0.04, 0.03),
+    )
+    fov_y: tuple[float, float] = (0.55, 0.7)
+
+    def sample(self, rng: np.random.Generator, width: int, height: int) -> View:
+        """Draws one camera."""
+        azimuth, elevation = rng.uniform(*self.azimuth), rng.uniform(*self.elevation)
+        direction = np.array(
+            [
+                np.cos(elevation) * np.cos(azimuth),
+                np.cos(elevation) * np.sin(azimuth),
+                np.sin(elevation),
+            ]
+        )
+        middle, half = np.asarray(self.target)
+        target = middle + half * rng.uniform(-1, 1, 3)
+        return View(
+            T_world_camera=look_at(target + rng.uniform(*self.distance) * direction, target),
+            fov_y=rng.uniform(*self.fov_y),
+            width=width,
+            height=height,
+        )
+
+
+class RenderedCamera:
+    """A camera in a scene that has a renderer."""
+
+    def __init__(self, scene: sapien.Scene, view: View) -> None:
+        self.view = view
+        self._camera = sapien.render.RenderCameraComponent(view.width, view.height)
+        self._camera.set_fovy(view.fov_y, compute_x=True)
+        self._camera.near, self._camera.far = NEAR, FAR
+        entity = sapien.Entity()
+        entity.add_component(self._camera)
+        entity.name = "camera"
+        R_world_simcam = view.T_world_camera[:3, :3] @ R_SIMCAM_CAMERA.T
+        T = view.T_world_camera.copy()
+        T[:3, :3] = R_world_simcam
+        entity.pose = pose_from_transform(T)
+        scene.add_entity(entity)
+        self._scene = scene
+
+    def take(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """RGB (h, w, 3) and depth (h, w) of the scene as it stands."""
+        self._scene.update_render()
+        self._camera.take_picture()
+        color = self._camera.get_picture("Color")
+        position = self._camera.get_picture("PositionSegmentation")
+        rgb = color[..., :3]
+        if rgb.dtype != np.uint8:
+            rgb = np.clip(rgb * 255.0, 0, 255).astype(np.uint8)
+        # The simulator's camera looks along -z in its pictures' coordinates, in millimetres
+        # where they are integers.
+        depth = -position[..., 2].astype(np.float32)
+        if np.issubdtype(position.dtype, np.integer):
+            depth /= 1000.0
+        depth[(depth < NEAR) | (depth > FAR)] = 0.0
+        return np.ascontiguousarray(rgb), np.ascontiguousarray(depth)

@@ -1,0 +1,253 @@
+"""The floating Panda hand: geometry, construction, control.
+
+The hand's frame is ``panda_hand`` of the Franka description: z is the approach direction, y the
+closing direction. Its collision shapes are boxes; ``HAND_BOXES`` is their only definition.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import sapien
+from numpy.typing import NDArray
+from sapien import physx
+
+from artgym.errors import MissingDependencyError
+from artgym.geometry import transforms
+from artgym.geometry.grasps import GRASP_DEPTH
+from artgym.geometry.rotations import matrix_from_axis_angle
+from artgym.sim.conversion import pose_from_transform, transform_from_pose
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandBox:
+    """One collision cuboid of the hand.
+
+    Attributes:
+        link: "hand", "left" (moves along +y) or "right" (moves along -y).
+        half_size: metres.
+        center: in the frame of its link; a closed finger's origin lies at ``FINGER_ORIGIN``.
+        tilt: turn about the link's x axis, radians.
+    """
+
+    link: str
+    half_size: tuple[float, float, float]
+    center: tuple[float, float, float]
+    tilt: float = 0.0
+
+    @property
+    def T_link_box(self) -> Array:
+        """Pose (4, 4) of the box in its link."""
+        return transforms.transform_from(
+            matrix_from_axis_angle([self.tilt, 0.0, 0.0]), self.center
+        )
+
+
+def _finger_boxes(link: str, side: float) -> tuple[HandBox, ...]:
+    """Mount, slide, shank and rubber pad of one finger; ``side`` is the sign of y."""
+    return (
+        HandBox(link=link, half_size=(0.011, 0.0075, 0.010), center=(0, side * 0.0185, 0.011)),
+        HandBox(link=link, half_size=(0.011, 0.0044, 0.0019), center=(0, side * 0.0068, 0.0022)),
+        HandBox(
+            link=link,
+            half_size=(0.00875, 0.0035, 0.01175),
+            center=(0, side * 0.0159, 0.02835),
+            tilt=side * np.pi / 6,
+        ),
+        HandBox(
+            link=link, half_size=(0.00875, 0.0076, 0.00925), center=(0, side * 0.0076, 0.04525)
+        ),
+    )
+
+
+#: Where a finger's frame lies in the hand's when the jaws are closed, metres along z.
+FINGER_ORIGIN = 0.0584
+#: Largest travel of one finger; the jaws open to twice this, metres.
+FINGER_TRAVEL = 0.04
+#: Tip of the fingers in the hand's frame, metres along z.
+TIP = 0.1129
+#: The tool centre point, the middle of the pads, metres along z.
+TCP = 0.1034
+
+HAND_BOXES: tuple[HandBox, ...] = (
+    HandBox(link="hand", half_size=(0.0316, 0.1025, 0.033), center=(0, 0, 0.033)),
+    *_finger_boxes("left", 1.0),
+    *_finger_boxes("right", -1.0),
+)
+
+T_hand_tcp: Array = transforms.translation([0.0, 0.0, TCP])
+#: A grasp's frame lies at the surface point, ``GRASP_DEPTH`` short of the fingertips.
+T_hand_grasp: Array = transforms.translation([0.0, 0.0, TIP - GRASP_DEPTH])
+T_grasp_tcp: Array = transforms.invert(T_hand_grasp) @ T_hand_tcp
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandControl:
+    """Gains of the spring that pulls the hand, and of its fingers.
+
+    Force limits are what an arm can give at its flange and what the Panda's jaws can give.
+    """
+
+    linear_stiffness: float = 4e3
+    linear_damping: float = 1.2e2
+    linear_force: float = 80.0
+    angular_stiffness: float = 4e2
+    angular_damping: float = 1.2e1
+    angular_torque: float = 12.0
+    finger_stiffness: float = 1e4
+    finger_damping: float = 1e2
+    finger_force: float = 35.0
+
+
+_MASS = {"hand": 0.73, "left": 0.05, "right": 0.05}
+_INERTIA = {
+    "hand": (0.0025, 0.001, 0.0017),
+    "left": (2e-5, 2e-5, 1e-5),
+    "right": (2e-5, 2e-5, 1e-5),
+}
+_PAD_FRICTION = 1.2
+
+
+class FloatingHand:
+    """A Panda hand with a free root, pulled towards a target pose by a six-axis spring.
+
+    Args:
+        scene: the scene it is built into.
+        T_world_hand: where it starts, (4, 4).
+        width: opening of the jaws at the start, metres in [0, 0.08].
+        visuals: whether to load what cameras see; needs the scene to have a renderer.
+        control: gains.
+    """
+
+    def __init__(
+        self,
+        scene: sapien.Scene,
+        T_world_hand: Array,
+        width: float,
+        *,
+        visuals: bool,
+        control: HandControl,
+    ) -> None:
+        self._control = control
+        pads = physx.PhysxMaterial(_PAD_FRICTION, _PAD_FRICTION, 0.0)
+        entities = [sapien.Entity() for _ in range(3)]
+        links: list[physx.PhysxArticulationLinkComponent] = []
+        for name, entity in zip(("hand", "left", "right"), entities, strict=True):
+            link = physx.PhysxArticulationLinkComponent(links[0] if links else None)
+            for box in HAND_BOXES:
+                if box.link == name:
+                    shape = physx.PhysxCollisionShapeBox(box.half_size, pads)
+                    shape.local_pose = pose_from_transform(box.T_link_box)
+                    # One bit shared by the hand's shapes: they never collide with each other.
+                    shape.set_collision_groups([1, 1, 1 << 1, 0])
+                    link.attach(shape)
+            link.mass = _MASS[name]
+            link.inertia = _INERTIA[name]
+            link.cmass_local_pose = sapien.Pose([0, 0, 0.03])
+            link.disable_gravity = True
+            entity.add_component(link)
+            if visuals:
+                entity.add_component(_visual_body(name))
+            entity.name = link.name = f"panda_{name}"
+            links.append(link)
+        for link, side in zip(links[1:], (1.0, -1.0), strict=True):
+            joint = link.joint
+            joint.type = "prismatic"
+            # A prismatic joint slides along the x axis of its frame: lay it along +y or -y.
+            frame = sapien.Pose(q=[np.sqrt(0.5), 0, 0, side * np.sqrt(0.5)])
+            joint.pose_in_parent = sapien.Pose([0, 0, FINGER_ORIGIN]) * frame
+            joint.pose_in_child = frame
+            joint.limit = np.array([0.0, FINGER_TRAVEL])
+            joint.set_drive_property(
+                control.finger_stiffness, control.finger_damping, control.finger_force
+            )
+            joint.set_drive_target(0.5 * width)
+        links[0].joint.type = "undefined"
+        entities[0].pose = pose_from_transform(T_world_hand)
+        for entity in entities:
+            scene.add_entity(entity)
+        self.links = tuple(links)
+        self._root = links[0]
+        self._fingers = tuple(link.joint for link in links[1:])
+        self._articulation = links[0].articulation
+        self._articulation.create_fixed_tendon(
+            links, [0, -1, 1], [0, -1, 1], rest_length=0.0, stiffness=1e5
+        )
+        self._articulation.qpos = np.full(2, 0.5 * width)
+        self._drive = physx.PhysxDriveComponent(links[0])
+        self._drive.parent = None
+        for set_property in (
+            self._drive.set_drive_property_x,
+            self._drive.set_drive_property_y,
+            self._drive.set_drive_property_z,
+        ):
+            set_property(control.linear_stiffness, control.linear_damping, control.linear_force)
+        self._drive.set_drive_property_slerp(
+            control.angular_stiffness, control.angular_damping, control.angular_torque
+        )
+        entities[0].add_component(self._drive)
+        self.pull_to(entities[0].pose)
+
+    def pull_to(self, pose_world: sapien.Pose) -> None:
+        """Sets where the spring pulls the hand's frame to."""
+        self._drive.set_drive_target(pose_world)
+
+    def open_jaws(self, width: float = 2 * FINGER_TRAVEL) -> None:
+        """Lets the fingers go to a width, metres."""
+        for joint in self._fingers:
+            joint.set_drive_target(0.5 * width)
+
+    def close_jaws(self) -> None:
+        """Lets the fingers close, on whatever lies between them."""
+        self.open_jaws(0.0)
+
+    def pose(self) -> Array:
+        """``T_world_hand`` (4, 4)."""
+        return transform_from_pose(self._root.entity_pose)
+
+    def velocity(self) -> Array:
+        """(6,): linear m/s and angular rad/s of the hand, world frame."""
+        return np.concatenate([self._root.linear_velocity, self._root.angular_velocity])
+
+    def width(self) -> float:
+        """Opening of the jaws, metres."""
+        return float(self._articulation.qpos.sum())
+
+
+@functools.cache
+def panda_meshes() -> Path:
+    """Folder of the Panda's visual meshes, inside the installed mani_skill package.
+
+    Raises:
+        MissingDependencyError: mani_skill is not installed.
+    """
+    spec = importlib.util.find_spec("mani_skill")
+    if spec is None or spec.origin is None:
+        raise MissingDependencyError(
+            "the Panda's meshes come with the package mani_skill, which is not installed; "
+            "pip install mani-skill"
+        )
+    robots = Path(spec.origin).parent / "assets" / "robots"
+    return robots / "panda" / "franka_description" / "meshes" / "visual"
+
+
+@functools.cache
+def _visual_shape(name: str) -> sapien.render.RenderShapeTriangleMesh:
+    """The mesh of one link, loaded once a process."""
+    file = "hand.glb" if name == "hand" else "finger.glb"
+    shape = sapien.render.RenderShapeTriangleMesh(str(panda_meshes() / file))
+    if name == "right":
+        shape.local_pose = sapien.Pose(q=[0, 0, 0, 1])
+    return shape
+
+
+def _visual_body(name: str) -> sapien.render.RenderBodyComponent:
+    body = sapien.render.RenderBodyComponent()
+    body.attach(_visual_shape(name).clone())
+    return body

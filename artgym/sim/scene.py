@@ -1,0 +1,285 @@
+"""One episode's world: a table, an articulated object, a hand.
+
+A scene is always built anew: reusing one changes the outcome of identical contacts, and building
+costs about a millisecond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sapien
+from numpy.typing import NDArray
+from sapien import physx
+
+from artgym.geometry.transforms import transform_from
+from artgym.objects.model import ArticulatedObject, Box, Cylinder, Link, Material, Shape
+from artgym.sim.conversion import pose_from_transform, transform_from_pose
+from artgym.sim.robots import FloatingHand, HandControl
+
+Array = NDArray[np.floating]
+
+#: Half the side and half the thickness of the table's top, metres. Its surface is z = 0.
+TABLE_HALF_SIZE = (0.75, 0.75, 0.02)
+
+#: A joint's dry friction is a damper that saturates: at this fraction of the range a second.
+_CREEP = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhysicsConfig:
+    """How the simulator steps.
+
+    Attributes:
+        timestep: seconds of one step.
+        position_iterations: of the contact solver.
+        hand: gains of the hand.
+    """
+
+    timestep: float = 1.0 / 120.0
+    position_iterations: int = 15
+    hand: HandControl = HandControl()
+
+
+@dataclass(frozen=True)
+class PartContact:
+    """How the hand touches a part at one instant.
+
+    Attributes:
+        touched: some link of the hand presses on the part.
+        pinched: both fingers press on it, from opposite sides.
+    """
+
+    touched: bool
+    pinched: bool
+
+
+class ArticulatedBody:
+    """An object's articulation in a scene, its root fixed to the world."""
+
+    def __init__(
+        self,
+        scene: sapien.Scene,
+        obj: ArticulatedObject,
+        T_world_object: Array,
+        q: Sequence[float] | Array,
+        *,
+        visuals: bool,
+        position_iterations: int,
+        group: int = 0,
+    ) -> None:
+        self.model = obj
+        self.links: list[physx.PhysxArticulationLinkComponent] = []
+        index = {name: i for i, name in enumerate(obj.part_names)}
+        entities = []
+        for i, link in enumerate(obj.links):
+            joint = obj.joints[i - 1] if i else None
+            parent = self.links[index[joint.parent]] if joint else None
+            body = physx.PhysxArticulationLinkComponent(parent)
+            _attach_shapes(body, link, group)
+            body.name = link.name
+            entity = sapien.Entity()
+            entity.name = link.name
+            entity.add_component(body)
+            if visuals:
+                entity.add_component(visual_body(link.shapes))
+            if joint is None:
+                body.joint.type = "fixed"
+            else:
+                body.joint.name = joint.name
+                body.joint.type = "revolute_unwrapped" if joint.type == "revolute" else "prismatic"
+                frame = pose_from_transform(_joint_frame(joint.axis, joint.pivot))
+                body.joint.pose_in_parent = body.joint.pose_in_child = frame
+                low, high = sorted((joint.closed, joint.open))
+                body.joint.limit = np.array([low, high]) - joint.closed
+                # The damper's force saturates at the dry friction, so the joint stays where it
+                # is left and yields to any larger force.
+                slip = _CREEP * abs(joint.range)
+                body.joint.set_drive_property(0.0, joint.friction / slip, joint.friction)
+            self.links.append(body)
+            entities.append(entity)
+        entities[0].pose = pose_from_transform(T_world_object)
+        for entity in entities:
+            scene.add_entity(entity)
+        self._articulation = self.links[0].articulation
+        self._articulation.set_solver_position_iterations(position_iterations)
+        # The simulator counts q from the rest state, where all link frames coincide.
+        self._offset = obj.rest_positions
+        self._articulation.qpos = np.asarray(q, dtype=float) - self._offset
+        self._damping = np.array([joint.damping for joint in obj.joints])
+
+    def positions(self) -> Array:
+        """Joint positions (K - 1,), metres or radians."""
+        return self._articulation.qpos + self._offset
+
+    def velocities(self) -> Array:
+        """Joint velocities (K - 1,)."""
+        return self._articulation.qvel
+
+    def push(self, efforts: Array) -> None:
+        """Applies joint efforts (K - 1,), N or N m, during the coming step."""
+        self._articulation.qf = efforts - self._damping * self._articulation.qvel
+
+    def link_poses(self) -> Array:
+        """``Ts_world_link`` (K, 4, 4)."""
+        return np.stack([transform_from_pose(link.entity_pose) for link in self.links])
+
+
+class ManipulationScene:
+    """A table, one object, and a floating hand unless ``T_world_hand`` is None.
+
+    Args:
+        obj: the object.
+        T_world_object: its pose, (4, 4).
+        q: its joint positions.
+        T_world_hand: start of the hand, or None for a scene without one.
+        width: opening of the jaws at the start, metres.
+        config: physics.
+        render_system: shared renderer; without one the scene has nothing to be seen.
+    """
+
+    def __init__(
+        self,
+        obj: ArticulatedObject,
+        T_world_object: Array,
+        q: Sequence[float] | Array,
+        *,
+        T_world_hand: Array | None = None,
+        width: float = 0.08,
+        config: PhysicsConfig = PhysicsConfig(),
+        render_system: sapien.render.RenderSystem | None = None,
+        table_material: Material | None = None,
+    ) -> None:
+        self.config = config
+        systems: list[sapien.System] = [physx.PhysxCpuSystem()]
+        if render_system is not None:
+            systems.append(render_system)
+        self.sapien_scene = sapien.Scene(systems)
+        self._system = self.sapien_scene.physx_system
+        self._system.timestep = config.timestep
+        visuals = render_system is not None
+        self._add_table(table_material if visuals else None)
+        self.body = ArticulatedBody(
+            self.sapien_scene,
+            obj,
+            T_world_object,
+            q,
+            visuals=visuals,
+            position_iterations=config.position_iterations,
+        )
+        self.hand: FloatingHand | None = None
+        self._hand_links: dict[physx.PhysxArticulationLinkComponent, int] = {}
+        if T_world_hand is not None:
+            self.hand = FloatingHand(
+                self.sapien_scene, T_world_hand, width, visuals=visuals, control=config.hand
+            )
+            self._hand_links = {link: i for i, link in enumerate(self.hand.links)}
+
+    def _add_table(self, material: Material | None) -> None:
+        entity = sapien.Entity()
+        entity.name = "table"
+        body = physx.PhysxRigidStaticComponent()
+        body.attach(physx.PhysxCollisionShapeBox(TABLE_HALF_SIZE, _surface(0.8)))
+        entity.add_component(body)
+        if material is not None:
+            shape = Shape(
+                geometry=Box(half_size=TABLE_HALF_SIZE), position=(0, 0, 0), material=material
+            )
+            entity.add_component(visual_body((shape,)))
+        entity.pose = sapien.Pose([0, 0, -TABLE_HALF_SIZE[2]])
+        self.sapien_scene.add_entity(entity)
+
+    def step(self, count: int = 1) -> None:
+        """Advances physics by ``count`` steps."""
+        for _ in range(count):
+            self.body.push(np.zeros(len(self.body.links) - 1))
+            self._system.step()
+
+    def contact(self, part: int) -> PartContact:
+        """How the hand touches a part, from the last step's contacts."""
+        assert self.hand is not None
+        target = self.body.links[part]
+        touched, push = False, [0.0, 0.0, 0.0]
+        closing = None
+        for contact in self._system.get_contacts():
+            first, second = contact.bodies
+            if first is target:
+                finger, sign = self._hand_links.get(second), -1.0
+            elif second is target:
+                finger, sign = self._hand_links.get(first), 1.0
+            else:
+                continue
+            if finger is None:
+                continue
+            impulse = sum(point.impulse for point in contact.points)
+            if not np.any(impulse):
+                continue
+            touched = True
+            if closing is None:
+                closing = transform_from_pose(self.hand.links[0].entity_pose)[:3, 1]
+            push[finger] += sign * float(closing @ impulse)
+        # The part presses the left finger outwards along +y and the right one along -y.
+        return PartContact(touched=touched, pinched=push[1] > 0.0 > push[2])
+
+    def close(self) -> None:
+        """Takes everything out of the scene; a shared renderer keeps nothing of it."""
+        self.sapien_scene.clear()
+
+
+def _joint_frame(axis: Sequence[float], pivot: Sequence[float]) -> Array:
+    """A frame at the pivot whose x is the joint's axis: the simulator's convention."""
+    x = np.asarray(axis, dtype=float)
+    helper = np.eye(3)[np.argmin(np.abs(x))]
+    y = np.cross(x, helper)
+    y = y / np.linalg.norm(y)
+    return transform_from(np.stack([x, y, np.cross(x, y)], axis=-1), pivot)
+
+
+def _surface(friction: float) -> physx.PhysxMaterial:
+    return physx.PhysxMaterial(friction, friction, 0.0)
+
+
+def _attach_shapes(
+    body: physx.PhysxArticulationLinkComponent, link: Link, group: int
+) -> None:
+    material = _surface(link.friction)
+    for piece in link.shapes:
+        geometry = piece.geometry
+        if isinstance(geometry, Box):
+            shape = physx.PhysxCollisionShapeBox(geometry.half_size, material)
+        else:
+            shape = physx.PhysxCollisionShapeCylinder(
+                geometry.radius, geometry.half_length, material
+            )
+        shape.local_pose = pose_from_transform(piece.T_link_shape)
+        # Links of one object share a bit and never collide with each other.
+        shape.set_collision_groups([1, 1, 1 << 2, group])
+        body.attach(shape)
+    moments, axes = np.linalg.eigh(link.inertia)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] *= -1
+    body.mass = link.mass
+    body.inertia = moments
+    body.cmass_local_pose = pose_from_transform(transform_from(axes, link.center_of_mass))
+
+
+def visual_body(shapes: Sequence[Shape]) -> sapien.render.RenderBodyComponent:
+    """What cameras see of a link."""
+    body = sapien.render.RenderBodyComponent()
+    for piece in shapes:
+        look = piece.material
+        material = sapien.render.RenderMaterial(
+            base_color=[*look.color, 1.0], roughness=look.roughness, metallic=look.metallic
+        )
+        geometry = piece.geometry
+        if isinstance(geometry, Cylinder):
+            shape = sapien.render.RenderShapeCylinder(
+                geometry.radius, geometry.half_length, material
+            )
+        else:
+            shape = sapien.render.RenderShapeBox(geometry.half_size, material)
+        shape.local_pose = pose_from_transform(piece.T_link_shape)
+        body.attach(shape)
+    return body

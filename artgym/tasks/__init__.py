@@ -1,0 +1,1 @@
+"""What counts: success and reward, as pure functions of state."""

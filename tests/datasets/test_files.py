@@ -1,0 +1,373 @@
+"""Files: round trips, equal bytes, and one clear error for each kind of damage."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import json
+import multiprocessing
+import os
+import pickle
+import time
+from typing import ClassVar
+
+import h5py
+import numpy as np
+import pytest
+
+from artgym.datasets import files
+from artgym.datasets.files import (
+    MANIFEST_NAME,
+    FileNotWrittenError,
+    Manifest,
+    SampleFolder,
+    ShardEntry,
+    read_arrays,
+    read_samples,
+    remove_stale_temporaries,
+    write_arrays,
+    write_file_whole,
+    write_samples,
+)
+from artgym.datasets.sample import ARRAY_FIELDS
+from artgym.errors import DamagedFileError, InvalidArgumentError
+from tests.datasets.sample_factory import random_sample
+
+CONFIG = {"seed": 7, "camera": {"width": 32, "height": 24}, "categories": ["laptop"]}
+
+
+def assert_same(left, right):
+    assert left.object_id == right.object_id
+    for name in ARRAY_FIELDS:
+        a, b = getattr(left, name), getattr(right, name)
+        assert isinstance(b, np.ndarray), name
+        assert a.dtype == b.dtype, name
+        np.testing.assert_array_equal(a, b, err_msg=name, strict=True)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Three shards of 2, 0 and 3 samples with a manifest."""
+    entries = []
+    for number, seeds in enumerate([(0, 1), (), (2, 3, 4)]):
+        path = tmp_path / "set" / f"train-{number}.h5"
+        write_samples(path, [random_sample(seed) for seed in seeds])
+        entries.append(ShardEntry.of(path, len(seeds)))
+    Manifest(config=CONFIG, planned=3, shards=tuple(entries)).write(tmp_path / "set")
+    return tmp_path / "set"
+
+
+class TestWholeFiles:
+    def test_replaces_and_makes_parents(self, tmp_path):
+        path = tmp_path / "a" / "b.bin"
+        write_file_whole(path, b"one")
+        write_file_whole(path, lambda temporary: temporary.write_bytes(b"two") and None)
+        assert path.read_bytes() == b"two"
+        assert list(path.parent.iterdir()) == [path]
+
+    def test_permissions_follow_the_umask(self, tmp_path):
+        (tmp_path / "plain").write_bytes(b"")
+        write_file_whole(tmp_path / "whole", b"")
+        assert (tmp_path / "whole").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+    def test_failing_writer_leaves_the_old_file(self, tmp_path):
+        path = tmp_path / "x"
+        write_file_whole(path, b"old")
+
+        def fail(temporary):
+            temporary.write_bytes(b"half")
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            write_file_whole(path, fail)
+        assert path.read_bytes() == b"old"
+        assert list(tmp_path.iterdir()) == [path]
+
+    @pytest.mark.parametrize("call", ["fsync", "replace"])
+    def test_full_disk(self, tmp_path, monkeypatch, call):
+        path = tmp_path / "x"
+        write_file_whole(path, b"old")
+
+        def refuse(*_):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        monkeypatch.setattr(os, call, refuse)
+        with pytest.raises(FileNotWrittenError, match="Free some space") as caught:
+            write_file_whole(path, b"new")
+        assert str(path) in str(caught.value)
+        assert path.read_bytes() == b"old"
+        assert list(tmp_path.iterdir()) == [path]
+
+    def test_file_where_a_folder_should_be(self, tmp_path):
+        (tmp_path / "file").write_bytes(b"")
+        with pytest.raises(FileNotWrittenError, match=r"cannot write .*file/x\.h5"):
+            write_samples(tmp_path / "file" / "x.h5", [])
+
+    def test_stale_temporaries_go_and_nothing_else(self, tmp_path):
+        for name in (".artgym-x.h5.12-ab.tmp", ".other.tmp", "x.h5"):
+            (tmp_path / name).write_bytes(b"")
+        remove_stale_temporaries(tmp_path)
+        assert sorted(p.name for p in tmp_path.iterdir()) == [".other.tmp", "x.h5"]
+
+
+class TestSamples:
+    def test_every_field_has_a_declared_shape(self):
+        assert tuple(files._SAMPLE_SHAPES) == ARRAY_FIELDS
+        assert set(files._SAMPLE_DTYPES) == set(ARRAY_FIELDS)
+
+    @pytest.mark.parametrize(
+        "sizes",
+        [
+            {},
+            {"num_points": 4096, "num_grasp_points": 200, "height": 60, "width": 80},
+            {"num_points": 0, "num_grasp_points": 0},
+            {"num_parts": 1, "num_points": 1},
+        ],
+    )
+    def test_round_trip(self, tmp_path, sizes):
+        samples = [random_sample(seed, **sizes) for seed in range(3)]
+        write_samples(tmp_path / "x.h5", samples)
+        for left, right in zip(samples, read_samples(tmp_path / "x.h5"), strict=True):
+            assert_same(left, right)
+
+    def test_views_in_any_memory_order(self, tmp_path):
+        sample = random_sample(0)
+        flipped = dataclasses.replace(sample, depth=np.asfortranarray(sample.depth))
+        write_samples(tmp_path / "x.h5", [flipped])
+        assert_same(sample, read_samples(tmp_path / "x.h5")[0])
+
+    def test_same_bytes_later_and_elsewhere(self, tmp_path):
+        write_samples(tmp_path / "a.h5", [random_sample(0), random_sample(1)])
+        time.sleep(1.1)  # beyond the resolution of HDF5's time stamps
+        write_samples(tmp_path / "b.h5", [random_sample(0), random_sample(1)])
+        assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+    @pytest.mark.parametrize(
+        ("field", "value", "message"),
+        [
+            ("depth", np.zeros((24, 32)), "depth should be float32, got float64"),
+            ("depth", np.zeros((24, 31), np.float32), r"depth should have shape \(24, 32\)"),
+            ("part", np.zeros((50, 1), np.uint8), r"part should have shape \(50\)"),
+            ("object_scale", np.float32(np.nan), "object_scale holds values that are not finite"),
+        ],
+    )
+    def test_misfits_are_refused(self, tmp_path, field, value, message):
+        bad = dataclasses.replace(random_sample(0), **{field: value})
+        with pytest.raises(InvalidArgumentError, match=message) as caught:
+            write_samples(tmp_path / "x.h5", [random_sample(1), bad])
+        assert "sample 1 (laptop/0000)" in str(caught.value)
+        assert not (tmp_path / "x.h5").exists()
+
+    @pytest.mark.parametrize("size", [0, 7, 100, 4000, -1])
+    def test_cut_short(self, tmp_path, size):
+        path = tmp_path / "x.h5"
+        write_samples(path, [random_sample(0)])
+        path.write_bytes(path.read_bytes()[:size])
+        with pytest.raises(DamagedFileError, match=r"x\.h5 is damaged"):
+            read_samples(path)
+
+    def test_missing_foreign_and_other_version(self, tmp_path):
+        with pytest.raises(DamagedFileError, match=r"x\.h5 is missing"):
+            read_samples(tmp_path / "x.h5")
+        with h5py.File(tmp_path / "foreign.h5", "w") as file:
+            file["data"] = np.zeros(3)
+        with pytest.raises(DamagedFileError, match=r"foreign\.h5 is damaged"):
+            read_samples(tmp_path / "foreign.h5")
+        write_arrays(tmp_path / "arrays.h5", {})
+        with pytest.raises(DamagedFileError, match="not 'artgym-samples'"):
+            read_samples(tmp_path / "arrays.h5")
+
+    def test_other_version(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(files, "SCHEMA_VERSION", 2)
+        write_samples(tmp_path / "x.h5", [])
+        monkeypatch.undo()
+        with pytest.raises(InvalidArgumentError, match=r"x\.h5 has schema version 2, .* reads 1"):
+            read_samples(tmp_path / "x.h5")
+
+    def test_links_out_of_the_file_are_not_followed(self, tmp_path):
+        write_samples(tmp_path / "secret.h5", [random_sample(0)])
+        write_samples(tmp_path / "x.h5", [random_sample(0)])
+        with h5py.File(tmp_path / "x.h5", "r+") as file:
+            del file["000000/depth"]
+            file["000000/depth"] = h5py.ExternalLink("secret.h5", "000000/depth")
+        with pytest.raises(DamagedFileError, match="no array 'depth'"):
+            read_samples(tmp_path / "x.h5")
+
+    def test_huge_claims_are_refused_unread(self, tmp_path):
+        write_samples(tmp_path / "x.h5", [random_sample(0)])
+        with h5py.File(tmp_path / "x.h5", "r+") as file:
+            del file["000000/depth"]
+            file["000000"].create_dataset("depth", (2**20, 2**20), "f4", chunks=(16, 16))
+        with pytest.raises(DamagedFileError, match="depth claims 4398046511104 bytes"):
+            read_samples(tmp_path / "x.h5")
+
+
+class TestArrays:
+    ARRAYS: ClassVar = {
+        "bits": np.random.default_rng(0).integers(0, 256, (300, 25)).astype(np.uint8),
+        "0012/normals": np.random.default_rng(1).normal(size=(300, 3)),
+        "0012/deep/flag": np.array(True),
+        "empty": np.zeros((0, 3), np.float32),
+    }
+    ATTRIBUTES: ClassVar = {"trials": 12, "nested": {"ünï": [1.5, None]}, "long": "x" * 10**5}
+
+    def test_round_trip_and_order(self, tmp_path):
+        write_arrays(tmp_path / "a.h5", self.ARRAYS, self.ATTRIBUTES)
+        backwards = dict(reversed(self.ARRAYS.items()))
+        write_arrays(tmp_path / "b.h5", backwards, self.ATTRIBUTES)
+        assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+        arrays, attributes = read_arrays(tmp_path / "a.h5")
+        assert attributes == self.ATTRIBUTES
+        assert list(arrays) == sorted(self.ARRAYS)
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(array, self.ARRAYS[name], strict=True)
+
+    @pytest.mark.parametrize(
+        ("arrays", "attributes"),
+        [
+            ({"x": np.array(["text"])}, {}),
+            ({"x": np.array([object()])}, {}),
+            ({"../x": np.zeros(1)}, {}),
+            ({"": np.zeros(1)}, {}),
+            ({"a": np.zeros(1), "a/b": np.zeros(1)}, {}),
+            ({}, {"x": float("nan")}),
+            ({}, {"x": object()}),
+        ],
+    )
+    def test_what_cannot_be_stored_is_refused(self, tmp_path, arrays, attributes):
+        with pytest.raises(InvalidArgumentError):
+            write_arrays(tmp_path / "x.h5", arrays, attributes)
+        assert not (tmp_path / "x.h5").exists()
+
+    def test_a_flipped_byte_is_found_or_harmless(self, tmp_path):
+        arrays = {"bits": self.ARRAYS["bits"], "small": np.arange(9)}
+        write_arrays(tmp_path / "a.h5", arrays, {"git": "abc"})
+        whole = bytearray((tmp_path / "a.h5").read_bytes())
+        found = 0
+        for position in np.random.default_rng(0).integers(0, len(whole), 150):
+            damaged = whole.copy()
+            damaged[position] ^= 0x10
+            (tmp_path / "b.h5").write_bytes(damaged)
+            try:
+                read, attributes = read_arrays(tmp_path / "b.h5")
+            except DamagedFileError:
+                found += 1
+            else:
+                assert attributes == {"git": "abc"}
+                assert all(np.array_equal(read[name], arrays[name]) for name in arrays)
+        assert found > 100
+
+
+class TestManifest:
+    def test_round_trip_sorted_and_same_bytes(self, tmp_path):
+        shards = [
+            ShardEntry(name=name, sha256="0" * 64, bytes=1, items=2) for name in ("b", "c", "a")
+        ]
+        manifest = Manifest(config={"sizes": (1, 2)}, planned=4)
+        for shard in shards:
+            manifest = manifest.with_shard(shard)
+        manifest.write(tmp_path / "x")
+        Manifest(config={"sizes": [1, 2]}, planned=4, shards=tuple(shards)).write(tmp_path / "y")
+        written = (tmp_path / "x" / MANIFEST_NAME).read_bytes()
+        assert written == (tmp_path / "y" / MANIFEST_NAME).read_bytes()
+        assert Manifest.read(tmp_path / "x") == manifest
+        assert [shard.name for shard in manifest.shards] == ["a", "b", "c"]
+        assert manifest.num_items == 6
+        assert not manifest.is_complete
+
+    def test_differences_are_named(self, folder):
+        wanted = {"seed": 7, "camera": {"width": 64, "height": 24}, "lights": 2}
+        with pytest.raises(InvalidArgumentError) as caught:
+            Manifest.read(folder).require_config(folder, wanted)
+        message = str(caught.value)
+        assert str(folder) in message
+        assert "config.camera.width is 32 in the folder, 64 asked" in message
+        assert "config.lights is absent in the folder, 2 asked" in message
+        assert "config.categories is ['laptop'] in the folder, absent asked" in message
+        assert "height" not in message
+
+    @pytest.mark.parametrize(
+        "content",
+        [
+            b"",
+            b"{",
+            b"\xff\xfe",
+            b"[]",
+            b"null",
+            b"{}",
+            b"[" * 100000,
+            b'{"format": "artgym-folder", "schema_version": 1, "config": {}, "planned": 1.5}',
+        ],
+    )
+    def test_not_a_manifest(self, folder, content):
+        (folder / MANIFEST_NAME).write_bytes(content)
+        with pytest.raises(DamagedFileError, match=r"manifest\.json is damaged.*delete the folder"):
+            SampleFolder(folder)
+
+    @pytest.mark.parametrize(
+        ("key", "value"),
+        [("name", "../x.h5"), ("name", 3), ("bytes", -1), ("items", "2"), ("sha256", "0")],
+    )
+    def test_bad_entries(self, folder, key, value):
+        content = json.loads((folder / MANIFEST_NAME).read_text())
+        content["shards"][0][key] = value
+        (folder / MANIFEST_NAME).write_text(json.dumps(content))
+        with pytest.raises(DamagedFileError, match=r"manifest\.json is damaged"):
+            Manifest.read(folder)
+
+    def test_other_version_and_no_manifest(self, folder, tmp_path):
+        content = json.loads((folder / MANIFEST_NAME).read_text())
+        (folder / MANIFEST_NAME).write_text(json.dumps({**content, "schema_version": 9}))
+        with pytest.raises(InvalidArgumentError, match=r"manifest\.json has schema version 9"):
+            SampleFolder(folder)
+        with pytest.raises(DamagedFileError, match=r"nowhere/manifest\.json is missing"):
+            SampleFolder(tmp_path / "nowhere")
+
+
+def _point_sum(folder: SampleFolder, index: int) -> float:
+    return float(folder[index].points_camera.sum())
+
+
+class TestSampleFolder:
+    def test_reads_like_a_list(self, folder):
+        samples = SampleFolder(folder)
+        assert len(samples) == 5
+        assert [s.object_id for s in samples] == [f"laptop/{seed:04d}" for seed in range(5)]
+        assert_same(samples[np.int64(3)], random_sample(3))
+        assert samples[-1].object_id == "laptop/0004"
+        assert [s.object_id for s in samples[1:3]] == ["laptop/0001", "laptop/0002"]
+        with pytest.raises(IndexError, match="index 5 is outside the 5 samples"):
+            samples[5]
+
+    @pytest.mark.parametrize("method", ["fork", "spawn"])
+    def test_other_processes(self, folder, method):
+        samples = SampleFolder(folder)
+        expected = [_point_sum(samples, index) for index in (0, 4)]
+        assert [_point_sum(pickle.loads(pickle.dumps(samples)), i) for i in (0, 4)] == expected
+        with multiprocessing.get_context(method).Pool(1) as pool:
+            assert pool.starmap(_point_sum, [(samples, 0), (samples, 4)]) == expected
+
+    def test_incomplete_only_when_allowed(self, folder):
+        dataclasses.replace(Manifest.read(folder), planned=4).write(folder)
+        with pytest.raises(InvalidArgumentError, match="3 of 4 shards"):
+            SampleFolder(folder)
+        assert len(SampleFolder(folder, allow_incomplete=True)) == 5
+
+    def test_missing_and_truncated_shards_are_found_at_once(self, folder):
+        path = folder / "train-2.h5"
+        path.write_bytes(path.read_bytes()[:-10])
+        with pytest.raises(DamagedFileError, match=r"train-2\.h5 is damaged: expected \d+ bytes"):
+            SampleFolder(folder)
+        path.unlink()
+        with pytest.raises(DamagedFileError, match=r"train-2\.h5 is damaged.*it is missing"):
+            SampleFolder(folder)
+
+    def test_a_flipped_byte_is_found_before_the_first_sample(self, folder):
+        path = folder / "train-2.h5"
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 1
+        path.write_bytes(content)
+        samples = SampleFolder(folder)
+        assert_same(samples[0], random_sample(0))
+        with pytest.raises(DamagedFileError, match=r"train-2\.h5 has another checksum.*Copy it"):
+            samples[2]
