@@ -1,5 +1,5 @@
 # `make test` and `make bench` work from a bare machine: both set up what they need first.
-BIN := .venv/bin
+PYTHON_HERE := .venv/bin/python
 export PYTHON
 
 .DEFAULT_GOAL := help
@@ -15,25 +15,25 @@ system:  ## install the system packages alone (as root)
 	@scripts/system_packages.sh
 
 test: lint  ## lint and every test but the slow ones
-	@$(BIN)/python -m pytest -n 2
+	@$(PYTHON_HERE) -m pytest -n 2
 
 test-slow: setup  ## the tests marked slow
-	@$(BIN)/python -m pytest -m slow
+	@$(PYTHON_HERE) -m pytest -m slow
 
 bench: setup  ## success rate of the policies; writes benchmarks/results
-	@$(BIN)/python -m benchmarks.success_rate
+	@$(PYTHON_HERE) -m benchmarks.success_rate
 
 lint: setup  ## ruff and codespell
-	@$(BIN)/ruff check .
-	@$(BIN)/ruff format --check .
-	@$(BIN)/codespell
+	@$(PYTHON_HERE) -m ruff check .
+	@$(PYTHON_HERE) -m ruff format --check .
+	@$(PYTHON_HERE) -m codespell_lib
 
 typecheck: setup  ## pyright
-	@$(BIN)/pyright
+	@$(PYTHON_HERE) -m pyright
 
 format: setup  ## rewrite the code as ruff formats it
-	@$(BIN)/ruff check --fix .
-	@$(BIN)/ruff format .
+	@$(PYTHON_HERE) -m ruff check --fix .
+	@$(PYTHON_HERE) -m ruff format .
 
 clean:  ## remove the virtual environment and all caches
 	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

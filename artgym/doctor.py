@@ -27,8 +27,6 @@ PACKAGES = (
     "embreex",
     "h5py",
     "torch",
-    "torchvision",
-    "lightning",
     "numba",
     "stable_baselines3",
 )

@@ -28,7 +28,7 @@ ENVIRONMENTS: tuple[EnvironmentEntry, ...] = (
     EnvironmentEntry(
         id="ArtOpen-v0",
         entry_point="artgym.envs.articulated_env:ArtOpenEnv",
-        horizon=200,
+        horizon=300,
         tags=frozenset({"single-object", "open"}),
     ),
 )

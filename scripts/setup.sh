@@ -54,6 +54,10 @@ find_python() {
 
 make_venv() {
     local python=$1
+    # One that works is kept, and only what changed is installed; `make clean` removes it.
+    if is_python_311 "$VENV/bin/python" && "$VENV/bin/python" -m pip --version >/dev/null 2>&1; then
+        return
+    fi
     if ! "$python" -c 'import ensurepip, venv' >/dev/null 2>&1; then
         # Debian and Ubuntu keep these in a package of their own.
         if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null && [ -z "${ARTGYM_NO_APT:-}" ]; then
@@ -70,13 +74,15 @@ make_venv() {
 }
 
 wanted_stamp() {
-    { "$1" --version && cat pyproject.toml constraints.txt scripts/setup.sh; } | sha256sum
+    # The folder counts: an editable installation points at it.
+    { "$1" --version && pwd && cat pyproject.toml constraints.txt scripts/setup.sh; } | sha256sum
 }
 
 install_packages() {
     local python=$1 started=$SECONDS torch
     say "virtual environment of $("$python" --version) in $VENV"
     make_venv "$python"
+    rm -f "$STAMP"
     : >"$LOG"
     torch=$(grep '^torch==' constraints.txt)
     local pip=("$VENV/bin/python" -m pip --disable-pip-version-check install --progress-bar off)

@@ -89,7 +89,9 @@ class Labels:
     @property
     def success(self) -> NDArray[np.bool_]:
         """(S, G, C): whether each try succeeded."""
-        return np.unpackbits(self.bits, axis=-1, count=NUM_CANDIDATES, bitorder="little").astype(bool)
+        return np.unpackbits(self.bits, axis=-1, count=NUM_CANDIDATES, bitorder="little").astype(
+            bool
+        )
 
 
 TRIAL_ENDS = ("moved", "not moved", "blocked", "empty")

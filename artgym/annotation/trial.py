@@ -96,9 +96,7 @@ def try_grasp(
     tick = config.physics.timestep * stride
     T_object_hand = T_object_grasp @ _T_GRASP_HAND
     approach = _approach_path(T_object_hand, config.standoff, config.speed * tick)
-    scene = ManipulationScene(
-        obj, np.eye(4), q, T_world_hand=approach[0], config=config.physics
-    )
+    scene = ManipulationScene(obj, np.eye(4), q, T_world_hand=approach[0], config=config.physics)
     hand = scene.hand
     assert hand is not None
     progress = Progress.begin(float(joint.open_fraction(q[part - 1])))

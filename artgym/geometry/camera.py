@@ -43,7 +43,9 @@ def project(points_camera: ArrayLike, intrinsics: ArrayLike) -> Array:
     return points[..., :2] / points[..., 2:] * K[[0, 1], [0, 1]] + K[:2, 2]
 
 
-def look_at(eye_world: ArrayLike, target_world: ArrayLike, up_world: ArrayLike = (0, 0, 1)) -> Array:
+def look_at(
+    eye_world: ArrayLike, target_world: ArrayLike, up_world: ArrayLike = (0, 0, 1)
+) -> Array:
     """``T_world_camera`` of a camera at ``eye`` that looks at ``target``, image top towards up."""
     eye = np.asarray(eye_world, dtype=float)
     z = np.asarray(target_world, dtype=float) - eye

@@ -10,11 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
+from artgym.geometry.transforms import translation
 
 Array = NDArray[np.floating]
 
 #: How far the fingertips go beyond the surface point along the approach, metres.
 GRASP_DEPTH = 0.02
+
+#: How far the fingertips go beyond the hand's tool centre point (TCP, the middle of the pads).
+TIP_BEYOND_TCP = 0.0095
+
+#: The tool centre in the grasp's frame, (4, 4).
+T_GRASP_TCP: Array = translation([0.0, 0.0, GRASP_DEPTH - TIP_BEYOND_TCP])
 
 #: Rings of approach directions: (tilt from the inward normal in degrees, directions on the ring).
 APPROACH_RINGS: tuple[tuple[float, int], ...] = ((0.0, 1), (27.0, 6), (52.0, 9), (78.0, 9))

@@ -253,9 +253,7 @@ class ArticulatedObject:
             UnknownNameError: the part does not exist or cannot move.
         """
         if not 1 <= part < self.num_parts:
-            raise UnknownNameError(
-                "movable part", part, [f"{i}" for i in range(1, self.num_parts)]
-            )
+            raise UnknownNameError("movable part", part, [f"{i}" for i in range(1, self.num_parts)])
         return self.joints[part - 1]
 
     def link_poses(self, q: Mapping[str, float] | Array | list[float]) -> Array:
@@ -277,6 +275,22 @@ class ArticulatedObject:
         """Axis-aligned box (2, 3) of the whole object at rest, object frame: NAOCS's box."""
         bounds = np.stack([link.bounds() for link in self.links])
         return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
+
+    def grip_point(self, part: int) -> Array:
+        """The point (3,) of a part, in its own frame, that its joint moves most plainly.
+
+        The middle of what lies farthest along a slide, or farthest from a hinge: a drawer's
+        handle, a lid's front edge. Privileged knowledge, for rewards and state observations.
+        """
+        joint = self.joint_of(part)
+        corners = np.concatenate([s.corners_link() for s in self.links[part].shapes])
+        axis = np.asarray(joint.axis)
+        if joint.type == "prismatic":
+            reach = corners @ axis * np.sign(joint.range)
+        else:
+            arm = corners - np.asarray(joint.pivot)
+            reach = np.linalg.norm(arm - np.outer(arm @ axis, axis), axis=1)
+        return corners[reach > reach.max() - 0.004].mean(axis=0)
 
     def content_hash(self) -> str:
         """SHA-256 of everything that describes the object; equal objects have equal hashes."""

@@ -19,7 +19,9 @@ def grid_points(link: Link, spacing: float) -> Array:
     """
     return np.concatenate(
         [
-            transforms.apply(shape.T_link_shape, _cover(primitive_mesh(shape.geometry).triangles, spacing))
+            transforms.apply(
+                shape.T_link_shape, _cover(primitive_mesh(shape.geometry).triangles, spacing)
+            )
             for shape in link.shapes
         ]
     )

@@ -104,15 +104,23 @@ class RenderedCamera:
         """RGB (h, w, 3) and depth (h, w) of the scene as it stands."""
         self._scene.update_render()
         self._camera.take_picture()
-        color = self._camera.get_picture("Color")
-        position = self._camera.get_picture("PositionSegmentation")
-        rgb = color[..., :3]
-        if rgb.dtype != np.uint8:
-            rgb = np.clip(rgb * 255.0, 0, 255).astype(np.uint8)
-        # The simulator's camera looks along -z in its pictures' coordinates, in millimetres
-        # where they are integers.
-        depth = -position[..., 2].astype(np.float32)
-        if np.issubdtype(position.dtype, np.integer):
-            depth /= 1000.0
+        color = self._camera.get_picture("Color")[..., :3]
+        rgb = (np.clip(color, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+        # Positions come in integer millimetres, the camera looking along -z.
+        position_mm = self._camera.get_picture("PositionSegmentation")
+        depth = position_mm[..., 2] * np.float32(-1e-3)
         depth[(depth < NEAR) | (depth > FAR)] = 0.0
-        return np.ascontiguousarray(rgb), np.ascontiguousarray(depth)
+        return rgb, depth
+
+
+def add_lights(scene: sapien.Scene, rng: np.random.Generator) -> None:
+    """Ambient light and one or two lamps from random directions above."""
+    ambient = rng.uniform(0.25, 0.5)
+    scene.set_ambient_light([ambient] * 3)
+    for _ in range(int(rng.integers(1, 3))):
+        azimuth, height = rng.uniform(-np.pi, np.pi), rng.uniform(0.6, 1.5)
+        strength = rng.uniform(0.6, 1.6)
+        warmth = rng.uniform(0.85, 1.0)
+        scene.add_directional_light(
+            [np.cos(azimuth), np.sin(azimuth), -height], [strength, strength, strength * warmth]
+        )

@@ -48,6 +48,8 @@ def _device_and_system() -> tuple[str, sapien.render.RenderSystem]:
             f"no device here can render: {problem} To mend it: {vulkan.remedy()} "
             "State and point-cloud observations work without it."
         )
+    # The cheapest shader with colour and position: depth comes in integer millimetres.
+    sapien.render.set_camera_shader_dir("minimal")
     refusals = []
     for name in _candidates(found):
         # A driver may offer a device and still lack what SAPIEN asks of it: only making the
@@ -82,7 +84,6 @@ def probe() -> dict[str, Any]:
     try:
         device, system = _device_and_system()
         start = time.perf_counter()
-        sapien.render.set_camera_shader_dir("minimal")
         scene = sapien.Scene([sapien.physx.PhysxCpuSystem(), system])
         camera = scene.add_camera("probe", 32, 32, fovy=1.0, near=0.01, far=10.0)
         builder = scene.create_actor_builder()
@@ -92,7 +93,6 @@ def probe() -> dict[str, Any]:
         builder.build_static()
         scene.update_render()
         camera.take_picture()
-        # The minimal shader gives positions in integer millimetres, camera looking along -z.
         depth_mm = -int(camera.get_picture("PositionSegmentation")[16, 16, 2])
         scene.clear()
     except (RendererUnavailableError, RuntimeError) as error:

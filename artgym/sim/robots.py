@@ -18,7 +18,7 @@ from sapien import physx
 
 from artgym.errors import MissingDependencyError
 from artgym.geometry import transforms
-from artgym.geometry.grasps import GRASP_DEPTH
+from artgym.geometry.grasps import T_GRASP_TCP
 from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.sim.conversion import pose_from_transform, transform_from_pose
 
@@ -44,9 +44,7 @@ class HandBox:
     @property
     def T_link_box(self) -> Array:
         """Pose (4, 4) of the box in its link."""
-        return transforms.transform_from(
-            matrix_from_axis_angle([self.tilt, 0.0, 0.0]), self.center
-        )
+        return transforms.transform_from(matrix_from_axis_angle([self.tilt, 0.0, 0.0]), self.center)
 
 
 def _finger_boxes(link: str, side: float) -> tuple[HandBox, ...]:
@@ -70,8 +68,6 @@ def _finger_boxes(link: str, side: float) -> tuple[HandBox, ...]:
 FINGER_ORIGIN = 0.0584
 #: Largest travel of one finger; the jaws open to twice this, metres.
 FINGER_TRAVEL = 0.04
-#: Tip of the fingers in the hand's frame, metres along z.
-TIP = 0.1129
 #: The tool centre point, the middle of the pads, metres along z.
 TCP = 0.1034
 
@@ -82,9 +78,7 @@ HAND_BOXES: tuple[HandBox, ...] = (
 )
 
 T_hand_tcp: Array = transforms.translation([0.0, 0.0, TCP])
-#: A grasp's frame lies at the surface point, ``GRASP_DEPTH`` short of the fingertips.
-T_hand_grasp: Array = transforms.translation([0.0, 0.0, TIP - GRASP_DEPTH])
-T_grasp_tcp: Array = transforms.invert(T_hand_grasp) @ T_hand_tcp
+T_hand_grasp: Array = T_hand_tcp @ transforms.invert(T_GRASP_TCP)
 
 
 @dataclass(frozen=True, kw_only=True)

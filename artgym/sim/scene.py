@@ -241,9 +241,7 @@ def _surface(friction: float) -> physx.PhysxMaterial:
     return physx.PhysxMaterial(friction, friction, 0.0)
 
 
-def _attach_shapes(
-    body: physx.PhysxArticulationLinkComponent, link: Link, group: int
-) -> None:
+def _attach_shapes(body: physx.PhysxArticulationLinkComponent, link: Link, group: int) -> None:
     material = _surface(link.friction)
     for piece in link.shapes:
         geometry = piece.geometry

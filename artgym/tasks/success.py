@@ -87,3 +87,20 @@ class Progress:
     def success_gripped(self) -> Any:
         """Half the range, gripped: the paper's successful grasp."""
         return (self.travel >= TRAVEL_THRESHOLD) & (self.gripped >= SHARE_THRESHOLD)
+
+
+def maniskill_success(progress: Progress, joint_speed: float) -> bool:
+    """ManiSkill 3's rule for opening cabinets: 75 % of the range reached and nearly at rest.
+
+    Contact plays no part in it. For comparison only.
+    """
+    return bool((progress.fraction >= 0.75) & (abs(joint_speed) < 0.5))
+
+
+def where2act_success(progress: Progress, joint_range: float) -> bool:
+    """Where2Act's rule: the joint moved by 0.01 (m or rad) or by half its range.
+
+    For comparison only.
+    """
+    moved = progress.travel * abs(joint_range)
+    return bool((moved > 0.01) | (progress.travel >= 0.5))

@@ -41,19 +41,24 @@ def make_drawer(object_id: str, rng: np.random.Generator) -> ArticulatedObject:
 
     floor = height - 2 * wall - drawer_height
     body = _body(family, width, depth, height, floor, wall, body_material)
+    # An inset front: framed by the walls, 2 mm free all round, its face up to 2 mm behind theirs.
+    face_x = depth / 2 - uniform(rng, (0.0, 0.002))
     front_thickness = uniform(rng, (0.010, 0.020))
-    # The front overlaps the walls, as an overlay front does; 2 mm stay free above and below it.
-    front_low = floor + (0.002 if family == "nightstand" else wall * 0.5)
-    front_high = height - 0.002
-    tray = _tray(width, depth, floor + wall, drawer_height, wall)
+    front_low, front_high = floor + wall + 0.002, height - wall - 0.002
+    half_front = width / 2 - wall - 0.002
     front = box_between(
-        (depth / 2, -width / 2 + 0.002, front_low),
-        (depth / 2 + front_thickness, width / 2 - 0.002, front_high),
+        (face_x - front_thickness, -half_front, front_low),
+        (face_x, half_front, front_high),
         front_material,
     )
-    face_x = depth / 2 + front_thickness
+    tray = _tray(width, depth, face_x - front_thickness, floor + wall, drawer_height, wall)
     grip = _HANDLE_MAKERS[handle](
-        rng, face_x, width, (front_low + front_high) / 2, front_high - front_low, handle_material
+        rng,
+        face_x,
+        2 * half_front,
+        (front_low + front_high) / 2,
+        front_high - front_low,
+        handle_material,
     )
     drawer_volume = sum(s.geometry.volume for s in (*tray, front, *grip))
     mass = uniform(rng, (0.4, 1.6))
@@ -115,13 +120,13 @@ def _body(
 
 
 def _tray(
-    width: float, depth: float, bottom: float, height: float, wall: float
+    width: float, depth: float, front: float, bottom: float, height: float, wall: float
 ) -> tuple[Shape, ...]:
     """The drawer's box behind its front, 3 mm clear of the cabinet."""
     gap, thin = 0.003, 0.006
     material = Material(color=(0.75, 0.68, 0.55), roughness=0.8)
     y = width / 2 - wall - gap
-    back, front = -depth / 2 + wall + gap, depth / 2
+    back = -depth / 2 + wall + gap
     low, high = bottom + gap, bottom + 0.8 * height
     return (
         box_between((back, -y, low), (front, y, low + thin), material),
@@ -186,7 +191,9 @@ def _ledge(
     z = z + uniform(rng, (0.0, 0.3)) * height
     return (
         box_between(
-            (face, -length / 2, z - thickness / 2), (face + reach, length / 2, z + thickness / 2), look
+            (face, -length / 2, z - thickness / 2),
+            (face + reach, length / 2, z + thickness / 2),
+            look,
         ),
     )
 

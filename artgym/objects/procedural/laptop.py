@@ -44,7 +44,9 @@ def make_laptop(object_id: str, rng: np.random.Generator) -> ArticulatedObject:
     low = base_top + gap
     lid = [
         box_between(
-            (hinge[0], -y + inset, low + 0.001), (x - inset, y - inset, low + lid_thickness), lid_shell
+            (hinge[0], -y + inset, low + 0.001),
+            (x - inset, y - inset, low + lid_thickness),
+            lid_shell,
         ),
         # The screen lies in the lid's underside, 1 mm proud.
         box_between(
@@ -112,7 +114,9 @@ def _keyboard(
 def _feet(x: float, y: float, material: Material) -> tuple[Shape, ...]:
     """Two strips of rubber, 2 mm high."""
     return tuple(
-        box_between((s * 0.8 * x - 0.008, -0.8 * y, 0.0), (s * 0.8 * x + 0.008, 0.8 * y, 0.002), material)
+        box_between(
+            (s * 0.8 * x - 0.008, -0.8 * y, 0.0), (s * 0.8 * x + 0.008, 0.8 * y, 0.002), material
+        )
         for s in (-1.0, 1.0)
     )
 

@@ -70,8 +70,12 @@ def painted(rng: np.random.Generator) -> Material:
 def metal(rng: np.random.Generator) -> Material:
     """Steel, brass, dark anodised."""
     warm = rng.random() < 0.25
-    color = _color(0.11, rng.uniform(0.3, 0.6) if warm else rng.uniform(0, 0.06), rng.uniform(0.15, 0.85))
-    return Material(color=color, roughness=uniform(rng, (0.25, 0.6)), metallic=uniform(rng, (0.3, 0.9)))
+    color = _color(
+        0.11, rng.uniform(0.3, 0.6) if warm else rng.uniform(0, 0.06), rng.uniform(0.15, 0.85)
+    )
+    return Material(
+        color=color, roughness=uniform(rng, (0.25, 0.6)), metallic=uniform(rng, (0.3, 0.9))
+    )
 
 
 def darker(material: Material, factor: float) -> Material:

@@ -1,0 +1,1 @@
+"""Scripted policies with privileged knowledge: the upper row of every table."""

@@ -1,0 +1,1 @@
+"""The point-cloud backbone and the compiled neighbourhood searches below it."""

@@ -1,0 +1,106 @@
+"""What the subcommands of `icaf4` do; their arguments are built from the signatures."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from artgym.datasets.files import SampleFolder
+from artgym.errors import InvalidArgumentError
+from icaf4_policy import drawing
+from icaf4_policy.checkpoint import description_path
+from icaf4_policy.inference import Perception
+from icaf4_policy.training import TrainingConfig
+from icaf4_policy.training import train as run_training
+
+
+def train(config: TrainingConfig, *, data: Path, out: Path, threads: int = 1) -> int:
+    """Train on generated samples. Interrupted, the same command goes on where it stopped.
+
+    Args:
+        config: how to train.
+        data: folder with `{category}/train` and `{category}/val`, made by `artgym generate`.
+        out: weights to write, ending in .safetensors.
+        threads: of torch; results are repeatable for the same number of them.
+    """
+    torch.set_num_threads(threads)
+    folder = data / config.category
+    run_training(config, SampleFolder(folder / "train"), SampleFolder(folder / "val"), out)
+    print(f"wrote {out} and {description_path(out)}")
+    return 0
+
+
+def predict(
+    *,
+    weights: Path,
+    rgb: Path,
+    depth: Path,
+    intrinsics: Path,
+    picture: Path = Path("prediction.png"),
+    depth_unit_m: float = 0.001,
+    grasps: int = 10,
+    seed: int = 0,
+) -> int:
+    """Look at one RGB-D image: print what is there as JSON, and draw it.
+
+    Args:
+        weights: trained weights, .safetensors.
+        rgb: colour image.
+        depth: 16-bit image in units of depth_unit_m, or .npy in metres; 0 where unknown.
+        intrinsics: text or JSON file with the 3x3 camera matrix.
+        picture: where to draw parts, affordance and the best grasps.
+        depth_unit_m: metres of one unit of a depth image.
+        grasps: how many proposals to print and draw.
+        seed: of the fits and the choice of points.
+    """
+    torch.set_num_threads(1)
+    if grasps < 0:
+        raise InvalidArgumentError(f"grasps={grasps} must be at least 0.")
+    image, K = drawing.read_rgb(rgb), drawing.read_intrinsics(intrinsics)
+    metres = drawing.read_depth(depth, depth_unit_m)
+    perception = Perception.load(weights)
+    prediction, view = perception.perceive(image, metres, K, rng=np.random.default_rng(seed))
+    drawing.write_image(picture, drawing.draw_prediction(image, K, prediction, grasps))
+    best = prediction.grasps
+    parts = zip(prediction.part_boxes, prediction.joints, strict=True)
+    report: dict[str, Any] = {
+        "category": perception.model.config.category,
+        "picture": str(picture),
+        "pixels": int(view.mask.sum()),
+        "up_camera": view.up_camera.tolist(),
+        "parts": [
+            {
+                "part": k,
+                "points": int((prediction.part == k).sum()),
+                "box": None if box is None else _json_fields(box),
+                "joint": _json_fields(joint),
+            }
+            for k, (box, joint) in enumerate(parts)
+        ],
+        "grasps": [
+            {
+                "score": float(best.scores[i]),
+                "part": int(best.parts[i]),
+                "point_camera": best.points_camera[i].tolist(),
+                "R_camera_grasp": best.R_camera_grasp[i].tolist(),
+            }
+            for i in range(min(grasps, len(best.scores)))
+        ],
+    }
+    print(json.dumps(report, indent=2))
+    return 0
+
+
+def _json_fields(record: Any) -> dict[str, Any]:
+    """The fields of a dataclass, arrays as lists."""
+    values = {f.name: getattr(record, f.name) for f in dataclasses.fields(record)}
+    return {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in values.items()}
+
+
+COMMANDS: dict[str, Callable[..., int]] = {"train": train, "predict": predict}

@@ -1,0 +1,129 @@
+"""Image files in, pictures of predictions out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image, ImageDraw
+
+from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.geometry.camera import project
+from artgym.geometry.grasps import GRASP_DEPTH
+from icaf4_policy.inference import Prediction
+
+#: Colours of the parts, RGB; they repeat beyond the last.
+_PART_COLORS = ((90, 130, 200), (240, 160, 60), (110, 190, 110), (200, 90, 160), (150, 120, 90))
+_AXIS_COLOR, _BEST_COLOR, _GRASP_COLOR = (255, 255, 0), (0, 255, 0), (0, 170, 220)
+#: Half the opening of the drawn jaws, the length of the drawn stem and axis, metres.
+_JAW_HALF_WIDTH, _STEM, _AXIS_HALF_LENGTH = 0.03, 0.06, 0.1
+
+
+def _read(path: Path) -> Image.Image:
+    try:
+        with Image.open(path) as image:
+            image.load()
+            return image
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise DamagedFileError(f"{path} cannot be read as an image ({error}).") from error
+
+
+def read_rgb(path: Path) -> NDArray[np.uint8]:
+    """A colour image, uint8 (H, W, 3)."""
+    return np.asarray(_read(path).convert("RGB"))
+
+
+def read_depth(path: Path, depth_unit_m: float) -> NDArray[np.float32]:
+    """Depth (H, W) in metres from a one-channel image in ``depth_unit_m``, or .npy in metres."""
+    if path.suffix == ".npy":
+        try:
+            return np.load(path, allow_pickle=False).astype(np.float32)
+        except (OSError, ValueError, EOFError) as error:
+            raise DamagedFileError(f"{path} cannot be read as an array ({error}).") from error
+    image = np.asarray(_read(path))
+    if image.ndim != 2:
+        raise InvalidArgumentError(
+            f"depth={str(path)!r} has shape {image.shape}: expected an image with one channel."
+        )
+    return image.astype(np.float32) * np.float32(depth_unit_m)
+
+
+def read_intrinsics(path: Path) -> NDArray[np.float64]:
+    """A 3x3 camera matrix from a JSON or whitespace-separated text file."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        values = json.loads(text) if path.suffix == ".json" else text.split()
+        matrix = np.array(values, dtype=float).reshape(3, 3)
+    except (OSError, ValueError, TypeError) as error:
+        raise DamagedFileError(f"{path} does not hold a 3x3 camera matrix ({error}).") from error
+    if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
+        raise InvalidArgumentError(
+            f"intrinsics={str(path)!r} holds {matrix.tolist()}: expected finite numbers and "
+            "positive focal lengths."
+        )
+    return matrix
+
+
+def write_image(path: Path, image: NDArray[np.uint8]) -> None:
+    """Writes a colour image; its format follows from the name's ending."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.fromarray(image).save(path)
+    except (OSError, ValueError) as error:
+        raise InvalidArgumentError(f"picture={str(path)!r} cannot be written ({error}).") from error
+
+
+def draw_prediction(
+    rgb: ArrayLike, intrinsics: ArrayLike, prediction: Prediction, num_grasps: int
+) -> NDArray[np.uint8]:
+    """Three panels side by side: parts, affordance, best grasps and joint axes.
+
+    Args:
+        rgb: uint8 (H, W, 3), the image that was looked at.
+        intrinsics: (3, 3).
+        prediction: what is drawn.
+        num_grasps: how many of the proposals.
+
+    Returns:
+        uint8 (H, 3 W, 3). The best grasp is green, joint axes are yellow.
+    """
+    rgb = np.asarray(rgb, dtype=np.uint8)
+    panels = [Image.fromarray(rgb // 2) for _ in range(3)]
+    parts, affordance, grasps = (ImageDraw.Draw(panel) for panel in panels)
+    width = max(1, rgb.shape[1] // 200)
+    corners = project(prediction.points_camera, intrinsics)
+    for (u, v), part, value in zip(
+        corners.tolist(), prediction.part, prediction.affordance, strict=True
+    ):
+        dot = (u - width, v - width, u + width, v + width)
+        parts.ellipse(dot, fill=_PART_COLORS[part % len(_PART_COLORS)])
+        affordance.ellipse(dot, fill=(int(255 * value), 60, int(255 * (1 - value))))
+    for joint in prediction.joints:
+        if np.any(joint.axis_camera):
+            reach = np.array([[-_AXIS_HALF_LENGTH], [_AXIS_HALF_LENGTH]]) * joint.axis_camera
+            _draw_line(grasps, joint.pivot_camera + reach, intrinsics, _AXIS_COLOR, width)
+    proposals = prediction.grasps
+    for i in reversed(range(min(num_grasps, len(proposals.scores)))):
+        R, point = proposals.R_camera_grasp[i], proposals.points_camera[i]
+        closing, approach = R[:, 1] * _JAW_HALF_WIDTH, R[:, 2]
+        palm, tip = point - approach * GRASP_DEPTH, point + approach * GRASP_DEPTH
+        color = _GRASP_COLOR if i else _BEST_COLOR
+        jaws = np.stack([tip - closing, palm - closing, palm + closing, tip + closing])
+        _draw_line(grasps, jaws, intrinsics, color, width)
+        _draw_line(grasps, np.stack([palm, palm - approach * _STEM]), intrinsics, color, width)
+    return np.concatenate([np.asarray(panel) for panel in panels], axis=1)
+
+
+def _draw_line(
+    panel: ImageDraw.ImageDraw,
+    points_camera: NDArray[np.floating],
+    intrinsics: ArrayLike,
+    color: tuple[int, int, int],
+    width: int,
+) -> None:
+    """Draws a line through points (n, 3); none that reaches behind the camera."""
+    if points_camera[:, 2].min() > 0.01:
+        corners = project(points_camera, intrinsics)
+        panel.line([(u, v) for u, v in corners.tolist()], fill=color, width=width)

@@ -1,0 +1,149 @@
+"""A trained network against a labelled sample: one flat row of metrics a view."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, JOINT_NONE, Sample
+from artgym.geometry.grasps import candidate_rotations
+from artgym.geometry.transforms import invert, translation
+from icaf4_policy import metrics
+from icaf4_policy.inference import MIN_PART_POINTS, Perception, Prediction
+from icaf4_policy.pose_fitting import PoseFit
+
+Array = NDArray[np.floating]
+
+
+def true_part_boxes(sample: Sample) -> Array:
+    """``T_camera_box`` (K, 4, 4) of the parts' canonical boxes."""
+    return sample.T_camera_parts.astype(float) @ translation(sample.part_centers)
+
+
+def true_object_boxes(sample: Sample) -> Array:
+    """``T_camera_box`` (K, 4, 4) of the object's rest-state box as it moves with each part."""
+    T_camera_rests = sample.T_camera_parts @ invert(sample.T_object_rest_parts)
+    return T_camera_rests @ translation(sample.object_center)
+
+
+def evaluate_sample(
+    perception: Perception, sample: Sample, rng: np.random.Generator, *, top: int = 10
+) -> dict[str, float]:
+    """Every metric of one view, from the points of the sample's object.
+
+    Args:
+        perception: the network.
+        sample: a labelled view.
+        rng: for the choice of points, the fits and the chance rows.
+        top: J, proposals a point that coverage counts.
+
+    Returns:
+        A row for ``metrics.mean_rows``; NaN where a metric does not apply. Grasp metrics are over
+        the points with successful tries that the network calls graspable
+        (``grasp/network/...``), and over all points with successful tries
+        (``grasp_all/network/...``), each beside its chance rows.
+    """
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    prediction = perception.predict(*seen, rng=rng)
+    row = _part_metrics(prediction, sample) | _joint_metrics(prediction, sample)
+
+    truth = sample.affordance[prediction.point_index]
+    known = truth != AFFORDANCE_UNKNOWN
+    called = prediction.affordance > 0.5
+    ious = metrics.class_ious(called[known], truth[known] == AFFORDANCE_YES, 2)
+    row["affordance_iou"] = float(ious[1])
+    row["affordance_miou"] = float(np.nanmean(ious)) if known.any() else float("nan")
+    row["label_density"], row["label_density_graspable"] = metrics.label_density(
+        sample.successful_tries()
+    )
+    return row | _grasp_metrics(perception, sample, rng, top)
+
+
+def _part_metrics(prediction: Prediction, sample: Sample) -> dict[str, float]:
+    true_part = sample.part[prediction.point_index]
+    ious = metrics.class_ious(prediction.part, true_part, sample.num_parts)
+    row = {"part_miou": float(np.nanmean(ious))}
+    visible = np.bincount(true_part, minlength=sample.num_parts) >= MIN_PART_POINTS
+    found = [box is not None for box in prediction.part_boxes]
+    row["parts_found"] = float(np.mean(np.array(found)[visible])) if visible.any() else np.nan
+    row |= _box_metrics("part", prediction.part_boxes, true_part_boxes(sample), visible)
+    return row | _box_metrics("object", prediction.object_boxes, true_object_boxes(sample), visible)
+
+
+def _box_metrics(
+    name: str,
+    fits: tuple[PoseFit | None, ...],
+    T_camera_boxes: Array,
+    visible: NDArray[np.bool_],
+) -> dict[str, float]:
+    rotations, translations = np.full(len(fits), np.nan), np.full(len(fits), np.nan)
+    for k, fit in enumerate(fits):
+        if fit is not None and visible[k]:
+            rotation, translations[k] = metrics.pose_errors(fit.T_camera_box, T_camera_boxes[k])
+            rotations[k] = np.degrees(rotation)
+    row = {}
+    for k in range(len(fits)):
+        row[f"{name}_rotation_deg/{k}"] = float(rotations[k])
+        row[f"{name}_translation_m/{k}"] = float(translations[k])
+    any_fit = np.isfinite(rotations).any()
+    row[f"{name}_rotation_deg"] = float(np.nanmean(rotations)) if any_fit else np.nan
+    row[f"{name}_translation_m"] = float(np.nanmean(translations)) if any_fit else np.nan
+    return row
+
+
+def _joint_metrics(prediction: Prediction, sample: Sample) -> dict[str, float]:
+    rows = []
+    for k in np.flatnonzero(sample.joint_type != JOINT_NONE):
+        joint = prediction.joints[k]
+        if prediction.part_boxes[k] is None:
+            continue
+        angle, distance = metrics.axis_errors(
+            joint.axis_camera,
+            joint.pivot_camera,
+            sample.joint_axis_camera[k],
+            sample.joint_pivot_camera[k],
+        )
+        right = joint.joint_type == sample.joint_type[k]
+        revolute = right and joint.joint_type == 1
+        rows.append(
+            {
+                "joint_type_accuracy": float(right),
+                "joint_axis_deg": float(np.degrees(angle)) if right else np.nan,
+                "joint_pivot_m": distance if revolute else np.nan,
+            }
+        )
+    return metrics.mean_rows(rows)
+
+
+def _grasp_metrics(
+    perception: Perception, sample: Sample, rng: np.random.Generator, top: int
+) -> dict[str, float]:
+    points = perception.point_grasps(
+        sample.points_camera, sample.colors, sample.R_level_camera, top=top, rng=rng
+    )
+    label = sample.grasp_row[points.point_index]
+    tries = sample.successful_tries()
+    judged = np.flatnonzero((label >= 0) & tries.any(axis=1)[label])
+    if not len(judged):
+        return {}
+    R_camera_parts = sample.T_camera_parts[:, :3, :3].astype(float)[
+        sample.grasp_part[label[judged]]
+    ]
+    normals = sample.grasp_normals_part[label[judged]].astype(float)
+    R_camera_candidates = R_camera_parts[:, None] @ candidate_rotations(normals)
+    normals_camera = (R_camera_parts @ normals[..., None])[..., 0]
+    proposals = {"network": points.R_camera_grasp[judged]}
+    for name, propose in metrics.CHANCE_ROWS.items():
+        proposals[name] = propose(normals_camera, top, rng)
+    called = points.affordance[judged] > 0.5
+    row: dict[str, float] = {"grasp_points_called": float(called.mean())}
+    for name, R_proposals in proposals.items():
+        scores = []
+        for i in range(len(judged)):
+            R_successes = R_camera_candidates[i, tries[label[judged[i]]]]
+            distances = metrics.grasp_distances(R_proposals[i], R_successes)
+            scores.append(metrics.grasp_scores(distances))
+        for prefix, chosen in (("grasp", called), ("grasp_all", np.ones_like(called))):
+            means = metrics.mean_rows(s for s, c in zip(scores, chosen, strict=True) if c)
+            row |= {f"{prefix}/{name}/{key}": value for key, value in means.items()}
+    return row

@@ -1,0 +1,408 @@
+"""From an RGB-D image to parts, poses, joints and ranked grasps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
+from artgym.errors import InvalidArgumentError
+from artgym.geometry.rotations import grasp_angle
+from icaf4_policy.anchors import axis_anchors, grasps_from_residuals
+from icaf4_policy.checkpoint import load_model
+from icaf4_policy.cloud import choose_points, level_points
+from icaf4_policy.model import Icaf4, Outputs
+from icaf4_policy.pose_fitting import PoseFit, fit_pose
+from icaf4_policy.tabletop import MIN_OBJECT_POINTS, ObjectView, segment_object
+
+Array = NDArray[np.floating]
+
+#: A part is found if this many points are on it.
+MIN_PART_POINTS = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProposalConfig:
+    """How grasps are ranked and thinned out.
+
+    Attributes:
+        points: of the cloud, this many of highest affordance are asked for grasps.
+        count: J, the most proposals to return.
+        distance: metres, and
+        angle: radians; a proposal nearer than both to a better one is dropped.
+    """
+
+    points: int = 384
+    count: int = 64
+    distance: float = 0.02
+    angle: float = float(np.radians(25.0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointEstimate:
+    """The joint that moves one part.
+
+    Attributes:
+        joint_type: code of ``Sample.joint_type``; -1 also where the part was not found.
+        axis_camera: (3,), unit, opening direction positive; zeros without a joint.
+        pivot_camera: (3,), metres, a point of the axis near the part; for a slide, the part's
+            middle; zeros without a joint.
+    """
+
+    joint_type: int
+    axis_camera: Array
+    pivot_camera: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grasps:
+    """Proposals, best first. J of them.
+
+    Attributes:
+        points_camera: (J, 3), metres, surface points.
+        R_camera_grasp: (J, 3, 3), columns (x, y = closing, z = approach).
+        scores: (J,), probability that the point can be grasped times that of the anchor.
+        parts: int64 (J,), predicted part of the point.
+    """
+
+    points_camera: Array
+    R_camera_grasp: Array
+    scores: Array
+    parts: NDArray[np.int64]
+
+    def of_part(self, part: int) -> Grasps:
+        """The proposals on one part, still best first."""
+        keep = self.parts == part
+        return Grasps(
+            points_camera=self.points_camera[keep],
+            R_camera_grasp=self.R_camera_grasp[keep],
+            scores=self.scores[keep],
+            parts=self.parts[keep],
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PointGrasps:
+    """Grasps at every point of a cloud. N points, J grasps each, best first.
+
+    Attributes:
+        points_camera: (N, 3), metres.
+        point_index: int64 (N,), into the points that were given.
+        affordance: (N,), probability that the point can be grasped.
+        R_camera_grasp: (N, J, 3, 3).
+        scores: (N, J), probability of each anchor.
+    """
+
+    points_camera: Array
+    point_index: NDArray[np.int64]
+    affordance: Array
+    R_camera_grasp: Array
+    scores: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prediction:
+    """What the network says about one view. N points, K parts (base = 0).
+
+    Attributes:
+        points_camera: (N, 3), metres.
+        point_index: int64 (N,), into the points that were given.
+        part: int64 (N,), and part_probability: (N, K).
+        npcs: (N, 3) and naocs: (N, 3), of the predicted part, 0.5 at the box's centre.
+        affordance: (N,), probability that the point can be grasped.
+        part_boxes: K fits of part boxes (``None`` where a part was not found). Their frame has the
+            axes of the part frame and its origin at the centre of the part's canonical box.
+        object_boxes: K fits of the object's rest-state box, each from the points of one part: the
+            pose the object would have if the whole moved with that part; that of part 0 is the
+            object's pose.
+        joints: K joints, ``JOINT_NONE`` for the base.
+        grasps: ranked proposals.
+        R_level_camera: (3, 3).
+    """
+
+    points_camera: Array
+    point_index: NDArray[np.int64]
+    part: NDArray[np.int64]
+    part_probability: Array
+    npcs: Array
+    naocs: Array
+    affordance: Array
+    part_boxes: tuple[PoseFit | None, ...]
+    object_boxes: tuple[PoseFit | None, ...]
+    joints: tuple[JointEstimate, ...]
+    grasps: Grasps
+    R_level_camera: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Perception:
+    """A trained network, ready to look.
+
+    Attributes:
+        model: in evaluation mode.
+        proposals: how grasps are ranked.
+    """
+
+    model: Icaf4
+    proposals: ProposalConfig
+
+    @classmethod
+    def load(cls, weights: str | Path, proposals: ProposalConfig | None = None) -> Perception:
+        """Loads trained weights (``.safetensors``, description beside it).
+
+        Raises:
+            DamagedFileError: either file is missing, damaged or does not match.
+        """
+        model, _ = load_model(Path(weights))
+        return cls(model=model, proposals=proposals or ProposalConfig())
+
+    def perceive(
+        self,
+        rgb: ArrayLike,
+        depth: ArrayLike,
+        intrinsics: ArrayLike,
+        up_camera_hint: ArrayLike | None = None,
+        exclude_mask: ArrayLike | None = None,
+        *,
+        rng: np.random.Generator,
+    ) -> tuple[Prediction, ObjectView]:
+        """Finds the object on the table and predicts everything about it.
+
+        Args:
+            rgb: uint8 (H, W, 3).
+            depth: (H, W), metres along z, 0 where unknown.
+            intrinsics: (3, 3).
+            up_camera_hint: rough upward direction in the camera frame, when known.
+            exclude_mask: bool (H, W), pixels of the robot, when known.
+            rng: for the fits and the choice of points.
+
+        Returns:
+            The prediction, and the view of the object that it was made from.
+        """
+        view = segment_object(depth, intrinsics, rgb, up_camera_hint, exclude_mask, rng=rng)
+        R_level_camera = level_from_camera(view.up_camera)
+        return self.predict(view.points_camera, view.colors, R_level_camera, rng=rng), view
+
+    @torch.inference_mode()
+    def predict(
+        self,
+        points_camera: ArrayLike,
+        colors: ArrayLike,
+        R_level_camera: ArrayLike,
+        *,
+        rng: np.random.Generator,
+    ) -> Prediction:
+        """Predicts everything about an object from its points.
+
+        Args:
+            points_camera: (M, 3), metres, of the object alone.
+            colors: uint8 (M, 3).
+            R_level_camera: (3, 3).
+            rng: for the fits and the choice of points.
+        """
+        outputs, points, pick = self._look(
+            points_camera, colors, R_level_camera, rng, self.proposals.points
+        )
+        return self._prediction(outputs, points, pick, np.asarray(R_level_camera, dtype=float), rng)
+
+    @torch.inference_mode()
+    def point_grasps(
+        self,
+        points_camera: ArrayLike,
+        colors: ArrayLike,
+        R_level_camera: ArrayLike,
+        *,
+        top: int,
+        rng: np.random.Generator,
+    ) -> PointGrasps:
+        """The ``top`` best anchors, refined, at every point; arguments as of ``predict``."""
+        outputs, points, pick = self._look(
+            points_camera, colors, R_level_camera, rng, self.model.config.num_points
+        )
+        anchors = axis_anchors(self.model.config.anchor_step_deg)
+        order = outputs.grasp_points[0].argsort()
+        scores, best = outputs.anchors[0, order].sigmoid().topk(min(top, len(anchors)), dim=-1)
+        residuals = outputs.residuals[0, order].take_along_dim(best[..., None], dim=1)
+        R_level_grasp = grasps_from_residuals(anchors[best.numpy()], residuals.numpy())
+        return PointGrasps(
+            points_camera=points,
+            point_index=pick,
+            affordance=outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float),
+            R_camera_grasp=np.asarray(R_level_camera, dtype=float).T @ R_level_grasp,
+            scores=scores.numpy().astype(float),
+        )
+
+    def _look(
+        self,
+        points_camera: ArrayLike,
+        colors: ArrayLike,
+        R_level_camera: ArrayLike,
+        rng: np.random.Generator,
+        grasp_points: int,
+    ) -> tuple[Outputs, Array, NDArray[np.int64]]:
+        """The network's outputs, the points it saw (N, 3), and which of the given they are."""
+        points_camera, colors = np.asarray(points_camera, dtype=float), np.asarray(colors)
+        if points_camera.ndim != 2 or len(points_camera) < MIN_OBJECT_POINTS:
+            raise InvalidArgumentError(
+                f"points_camera has shape {points_camera.shape}: expected (M, 3) with M at least "
+                f"{MIN_OBJECT_POINTS}."
+            )
+        points_level, _ = level_points(points_camera, R_level_camera)
+        config = self.model.config
+        pick = choose_points(len(points_camera), config.num_points, rng)
+        outputs = self.model(
+            torch.from_numpy(points_level[pick][None].astype(np.float32)),
+            torch.from_numpy(colors[pick][None].astype(np.float32) / 255.0),
+            min(grasp_points, config.num_points),
+        )
+        return outputs, points_camera[pick], pick
+
+    def _prediction(
+        self,
+        outputs: Outputs,
+        points: Array,
+        pick: NDArray[np.int64],
+        R_level_camera: Array,
+        rng: np.random.Generator,
+    ) -> Prediction:
+        num_parts = self.model.config.num_parts
+        part_probability = outputs.segmentation[0].softmax(dim=-1).numpy().astype(float)
+        part = part_probability.argmax(axis=-1)
+        rows = np.arange(len(points))
+        npcs = outputs.npcs[0].numpy()[rows, part].astype(float)
+        naocs = outputs.naocs[0].numpy()[rows, part].astype(float)
+        affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
+
+        part_boxes: list[PoseFit | None] = []
+        object_boxes: list[PoseFit | None] = []
+        joints = []
+        type_log = outputs.joint_type[0].log_softmax(dim=-1).numpy()
+        axis_camera = outputs.joint_axis[0].numpy() @ R_level_camera
+        offset_camera = outputs.joint_offset[0].numpy() @ R_level_camera
+        offset_camera = offset_camera * self.model.config.length_unit
+        for k in range(num_parts):
+            on_part = part == k
+            if on_part.sum() < MIN_PART_POINTS:
+                part_boxes.append(None)
+                object_boxes.append(None)
+                joints.append(_NO_JOINT)
+                continue
+            part_boxes.append(fit_pose(npcs[on_part], points[on_part], rng))
+            object_boxes.append(fit_pose(naocs[on_part], points[on_part], rng))
+            joints.append(
+                _joint_from_votes(
+                    type_log[on_part],
+                    axis_camera[on_part],
+                    points[on_part] + offset_camera[on_part],
+                    points[on_part],
+                    part_probability[on_part, k],
+                )
+            )
+        return Prediction(
+            points_camera=points,
+            point_index=pick,
+            part=part,
+            part_probability=part_probability,
+            npcs=npcs,
+            naocs=naocs,
+            affordance=affordance,
+            part_boxes=tuple(part_boxes),
+            object_boxes=tuple(object_boxes),
+            joints=tuple(joints),
+            grasps=self._ranked_grasps(outputs, points, part, affordance, R_level_camera),
+            R_level_camera=R_level_camera,
+        )
+
+    def _ranked_grasps(
+        self,
+        outputs: Outputs,
+        points: Array,
+        part: NDArray[np.int64],
+        affordance: Array,
+        R_level_camera: Array,
+    ) -> Grasps:
+        """Scores every (point, anchor) pair and keeps the best that differ."""
+        asked = outputs.grasp_points[0].numpy()  # (S,)
+        anchors = axis_anchors(self.model.config.anchor_step_deg)
+        scores = affordance[asked, None] * outputs.anchors[0].sigmoid().numpy()  # (S, L)
+        # Some tens of candidates for each proposal leave enough after thinning.
+        wanted = min(32 * self.proposals.count, scores.size)
+        keep = np.argpartition(-scores, wanted - 1, axis=None)[:wanted]
+        keep = keep[np.argsort(-scores.flat[keep], kind="stable")]
+        row, anchor = np.unravel_index(keep, scores.shape)
+        residuals = outputs.residuals[0].numpy()[row, anchor]
+        R_grasps = R_level_camera.T @ grasps_from_residuals(anchors[anchor], residuals)
+        chosen = diverse(points[asked[row]], R_grasps, self.proposals)
+        source = asked[row[chosen]]
+        return Grasps(
+            points_camera=points[source],
+            R_camera_grasp=R_grasps[chosen],
+            scores=scores[row[chosen], anchor[chosen]].astype(float),
+            parts=part[source],
+        )
+
+
+_NO_JOINT = JointEstimate(joint_type=JOINT_NONE, axis_camera=np.zeros(3), pivot_camera=np.zeros(3))
+
+
+def diverse(points: Array, R_grasps: Array, config: ProposalConfig) -> NDArray[np.int64]:
+    """Indices of grasps, best first, none near a better one (non-maximum suppression).
+
+    Args:
+        points: (n, 3), metres, best first.
+        R_grasps: (n, 3, 3).
+        config: how near is near, and how many to keep.
+    """
+    alive = np.ones(len(points), dtype=bool)
+    chosen = []
+    while alive.any() and len(chosen) < config.count:
+        best = int(np.argmax(alive))
+        chosen.append(best)
+        alive[best] = False
+        near = np.flatnonzero(alive)
+        near = near[((points[near] - points[best]) ** 2).sum(axis=-1) < config.distance**2]
+        alive[near[grasp_angle(R_grasps[best], R_grasps[near]) < config.angle]] = False
+    return np.array(chosen, dtype=np.int64)
+
+
+def _weighted_median(values: Array, weights: Array) -> Array:
+    """Weighted median of each column of ``values`` (n, d)."""
+    order = np.argsort(values, axis=0)
+    share = np.cumsum(weights[order], axis=0)
+    middle = np.argmax(share >= 0.5 * share[-1], axis=0)
+    return np.take_along_axis(values, np.take_along_axis(order, middle[None], axis=0), axis=0)[0]
+
+
+def _joint_from_votes(
+    type_log: Array, axes: Array, pivots: Array, points: Array, weights: Array
+) -> JointEstimate:
+    """One joint from the votes of a part's points.
+
+    The type has the largest mean log-probability; the axis is the mean direction of the votes
+    within 30 degrees of their component-wise median, and the pivot the median of theirs.
+
+    Args:
+        type_log: (n, 3), log-probabilities of the codes of ``Sample.joint_type`` plus one.
+        axes: (n, 3), camera frame.
+        pivots: (n, 3), nearest points of the axis, camera frame, metres.
+        points: (n, 3), camera frame, metres.
+        weights: (n,), probability that each point is on the part.
+    """
+    joint_type = int(np.argmax((weights[:, None] * type_log).sum(axis=0))) + JOINT_NONE
+    if joint_type == JOINT_NONE:
+        return _NO_JOINT
+    units = axes / np.maximum(np.linalg.norm(axes, axis=-1, keepdims=True), 1e-9)
+    middle = _weighted_median(units, weights)
+    middle = middle / max(np.linalg.norm(middle), 1e-9)
+    agrees = units @ middle > np.cos(np.radians(30.0))
+    mean = (weights * agrees) @ units if agrees.any() else middle
+    located = pivots if joint_type == JOINT_REVOLUTE else points
+    return JointEstimate(
+        joint_type=joint_type,
+        axis_camera=mean / max(np.linalg.norm(mean), 1e-9),
+        pivot_camera=_weighted_median(located, weights),
+    )

@@ -1,0 +1,244 @@
+"""What the network should say about a sample, worked out once, and batches of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from artgym.datasets.sample import (
+    AFFORDANCE_YES,
+    JOINT_NONE,
+    JOINT_REVOLUTE,
+    Sample,
+)
+from artgym.geometry.grasps import candidate_rotations
+from icaf4_policy.anchors import match_anchors
+from icaf4_policy.cloud import choose_points, level_points
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Targets:
+    """One sample as the network sees it, kept small. M points, G labelled surface points.
+
+    Attributes:
+        points_level: float32 (M, 3), metres, centred.
+        colors: uint8 (M, 3).
+        part: uint8 (M,).
+        npcs: float16 (M, 3) and naocs: float16 (M, 3).
+        affordance: uint8 (M,), codes of ``Sample.affordance``.
+        grasp_row: int32 (M,), into the G labelled points, or -1.
+        joint_type: uint8 (K,), code plus one; axis_level: float32 (K, 3), unit;
+            pivot_level: float32 (K, 3), metres, centred like the points.
+        match_start: int32 (G + 1,): the matches of labelled point g are
+            ``match_start[g]:match_start[g + 1]`` of the next two.
+        match_anchor: int16 (n,), matched anchors (the mask M of Eq. 3, sparse).
+        match_residual: float16 (n, 4), from the anchor to its nearest successful grasp (Eq. 4).
+    """
+
+    points_level: NDArray[np.float32]
+    colors: NDArray[np.uint8]
+    part: NDArray[np.uint8]
+    npcs: NDArray[np.float16]
+    naocs: NDArray[np.float16]
+    affordance: NDArray[np.uint8]
+    grasp_row: NDArray[np.int32]
+    joint_type: NDArray[np.uint8]
+    axis_level: NDArray[np.float32]
+    pivot_level: NDArray[np.float32]
+    match_start: NDArray[np.int32]
+    match_anchor: NDArray[np.int16]
+    match_residual: NDArray[np.float16]
+
+
+def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
+    """All grasps of a sample that succeeded.
+
+    Returns:
+        The labelled point of each (n,), ascending, and ``R_level_grasp`` (n, 3, 3).
+    """
+    row, attempt = np.nonzero(sample.successful_tries())
+    labelled, inverse = np.unique(row, return_inverse=True)
+    R_part_grasp = candidate_rotations(sample.grasp_normals_part[labelled])[inverse, attempt]
+    R_level_parts = sample.R_level_camera.astype(float) @ sample.T_camera_parts[:, :3, :3]
+    return row, R_level_parts[sample.grasp_part[row]] @ R_part_grasp
+
+
+def targets_from_sample(sample: Sample, anchors: NDArray[np.floating], max_points: int) -> Targets:
+    """Works out the targets of a sample.
+
+    Args:
+        sample: one view.
+        anchors: (L, 3, 3), level frame.
+        max_points: of a longer cloud, this many points are kept, evenly in their order.
+    """
+    points_level, center_level = level_points(sample.points_camera, sample.R_level_camera)
+    total = len(points_level)
+    keep = np.linspace(0, total - 1, min(total, max_points)).round().astype(int)
+    R_level_camera = sample.R_level_camera.astype(float)
+
+    row, R_level_grasp = successful_grasps(sample)
+    matched, residual = match_anchors(R_level_grasp, anchors)
+    # Of the grasps of one point that share an anchor, the nearest to it gives the residual.
+    order = np.lexsort((np.sum(residual**2, axis=-1), matched, row))
+    row, matched, residual = row[order], matched[order], residual[order]
+    first = np.ones(len(row), dtype=bool)
+    first[1:] = (np.diff(row) != 0) | (np.diff(matched) != 0)
+    row, matched, residual = row[first], matched[first], residual[first]
+
+    return Targets(
+        points_level=points_level[keep].astype(np.float32),
+        colors=sample.colors[keep],
+        part=sample.part[keep],
+        npcs=sample.npcs[keep].astype(np.float16),
+        naocs=sample.naocs[keep].astype(np.float16),
+        affordance=sample.affordance[keep],
+        grasp_row=sample.grasp_row[keep].astype(np.int32),
+        joint_type=(sample.joint_type - JOINT_NONE).astype(np.uint8),
+        axis_level=(sample.joint_axis_camera @ R_level_camera.T).astype(np.float32),
+        pivot_level=(sample.joint_pivot_camera @ R_level_camera.T - center_level).astype(
+            np.float32
+        ),
+        match_start=np.searchsorted(row, np.arange(len(sample.grasp_part) + 1)).astype(np.int32),
+        match_anchor=matched.astype(np.int16),
+        match_residual=residual.astype(np.float16),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """B clouds of N points with their targets; S points a cloud carry grasp targets.
+
+    Attributes:
+        points_level: float32 (B, N, 3), metres, and colors: float32 (B, N, 3) in [0, 1].
+        part: int64 (B, N).
+        npcs: float32 (B, N, 3) and naocs: float32 (B, N, 3).
+        affordance: int64 (B, N), 255 where unknown.
+        joint_type: int64 (B, N), code plus one, of the joint that moves the point's part.
+        joint_axis: float32 (B, N, 3), level frame, zeros without a joint.
+        joint_offset: float32 (B, N, 3), metres, point to nearest axis point, zeros unless revolute.
+        grasp_points: int64 (B, S).
+        grasp_weight: float32 (B, S): 1 at points with successful grasps, less at points known to
+            have none, 0 at fillers.
+        anchor_mask: float32 (B, S, L), the multi-hot mask of Eq. 3.
+        match_index: int64 (n,), where the mask is one, counted through (B, S, L).
+        match_residual: float32 (n, 4), the residuals there.
+    """
+
+    points_level: Tensor
+    colors: Tensor
+    part: Tensor
+    npcs: Tensor
+    naocs: Tensor
+    affordance: Tensor
+    joint_type: Tensor
+    joint_axis: Tensor
+    joint_offset: Tensor
+    grasp_points: Tensor
+    grasp_weight: Tensor
+    anchor_mask: Tensor
+    match_index: Tensor
+    match_residual: Tensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawConfig:
+    """How a batch is drawn from targets.
+
+    Attributes:
+        num_points: N.
+        num_anchors: L.
+        num_grasp_points: S.
+        negative_share: share of S given to points where every try failed.
+        negative_weight: their weight in the anchor loss.
+        color_jitter: spread of random gain, offset and tint of the colours; 0 leaves them.
+    """
+
+    num_points: int
+    num_anchors: int
+    num_grasp_points: int = 384
+    negative_share: float = 0.25
+    negative_weight: float = 0.3
+    color_jitter: float = 0.0
+
+
+def _jittered(
+    colors: NDArray[np.float32], strength: float, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    gain = np.exp(strength * rng.normal()) * np.exp(0.5 * strength * rng.normal(size=3))
+    shifted = (colors - 0.5) * gain + 0.5 + 0.5 * strength * rng.normal()
+    gray_share = rng.uniform(0.0, 1.0) ** 2 if rng.uniform() < 0.5 else 0.0
+    gray = shifted.mean(axis=-1, keepdims=True)
+    return np.clip(shifted + gray_share * (gray - shifted), 0.0, 1.0).astype(np.float32)
+
+
+def _draw_one(
+    targets: Targets, config: DrawConfig, rng: np.random.Generator
+) -> dict[str, NDArray[np.generic]]:
+    pick = choose_points(len(targets.points_level), config.num_points, rng)
+    points, part = targets.points_level[pick], targets.part[pick]
+    colors = targets.colors[pick].astype(np.float32) / 255.0
+    if config.color_jitter > 0:
+        colors = _jittered(colors, config.color_jitter, rng)
+
+    joint_type = targets.joint_type[part]
+    axis = targets.axis_level[part]
+    to_pivot = targets.pivot_level[part] - points
+    offset = to_pivot - np.sum(to_pivot * axis, axis=-1, keepdims=True) * axis
+    offset[joint_type != JOINT_REVOLUTE - JOINT_NONE] = 0.0
+
+    affordance, row = targets.affordance[pick], targets.grasp_row[pick]
+    good = rng.permutation(np.flatnonzero((affordance == AFFORDANCE_YES) & (row >= 0)))
+    bad = rng.permutation(np.flatnonzero((affordance != AFFORDANCE_YES) & (row >= 0)))
+    bad = bad[: int(config.negative_share * config.num_grasp_points)]
+    good = good[: config.num_grasp_points - len(bad)]
+    known = np.concatenate([good, bad])
+    grasp_points = np.zeros(config.num_grasp_points, np.int64)
+    grasp_points[: len(known)] = known
+    weight = np.zeros(config.num_grasp_points, np.float32)
+    weight[: len(good)] = 1.0
+    weight[len(good) : len(known)] = config.negative_weight
+
+    start, stop = targets.match_start[row[good]], targets.match_start[row[good] + 1]
+    lengths = stop - start
+    slot = np.repeat(np.arange(len(good)), lengths)
+    within = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    match = np.repeat(start, lengths) + within
+    index = slot * config.num_anchors + targets.match_anchor[match]
+    return {
+        "points_level": points,
+        "colors": colors,
+        "part": part.astype(np.int64),
+        "npcs": targets.npcs[pick].astype(np.float32),
+        "naocs": targets.naocs[pick].astype(np.float32),
+        "affordance": affordance.astype(np.int64),
+        "joint_type": joint_type.astype(np.int64),
+        "joint_axis": axis,
+        "joint_offset": offset,
+        "grasp_points": grasp_points,
+        "grasp_weight": weight,
+        "match_index": index.astype(np.int64),
+        "match_residual": targets.match_residual[match].astype(np.float32),
+    }
+
+
+def draw_batch(
+    targets: list[Targets], config: DrawConfig, rngs: list[np.random.Generator]
+) -> Batch:
+    """A batch with a fresh choice of points, one generator a cloud."""
+    rows = [_draw_one(t, config, rng) for t, rng in zip(targets, rngs, strict=True)]
+    cells = config.num_grasp_points * config.num_anchors
+    index = np.concatenate([r.pop("match_index") + b * cells for b, r in enumerate(rows)])
+    residual = np.concatenate([r.pop("match_residual") for r in rows])
+    mask = np.zeros((len(rows), config.num_grasp_points, config.num_anchors), np.float32)
+    mask.reshape(-1)[index] = 1.0
+    stacked = {name: torch.from_numpy(np.stack([r[name] for r in rows])) for name in rows[0]}
+    return Batch(
+        **stacked,
+        anchor_mask=torch.from_numpy(mask),
+        match_index=torch.from_numpy(index),
+        match_residual=torch.from_numpy(residual),
+    )

@@ -1,0 +1,208 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from artgym.datasets.sample import JOINT_NONE
+from artgym.errors import InvalidArgumentError
+from artgym.geometry.rotations import grasp_angle, matrix_from_axis_angle
+from icaf4_policy import cli
+from icaf4_policy.backbone.pointnet2 import BackboneConfig
+from icaf4_policy.checkpoint import save_model
+from icaf4_policy.drawing import read_rgb
+from icaf4_policy.evaluation import evaluate_sample
+from icaf4_policy.inference import Perception, ProposalConfig, _joint_from_votes, diverse
+from icaf4_policy.model import Icaf4, ModelConfig
+from icaf4_policy.tabletop import fit_table, segment_object
+from tests.icaf4_policy.toy import toy_sample
+
+
+@pytest.fixture(scope="module")
+def sample():
+    return toy_sample(3, num_points=2500)
+
+
+@pytest.fixture(scope="module")
+def perception():
+    torch.manual_seed(0)
+    config = ModelConfig(
+        category="toy",
+        num_parts=2,
+        length_unit=0.25,
+        num_points=512,
+        backbone=BackboneConfig(centers=(64, 16), neighbors=8),
+    )
+    return Perception(model=Icaf4(config).eval(), proposals=ProposalConfig(points=64, count=16))
+
+
+def rng():
+    return np.random.default_rng(0)
+
+
+def test_table_is_found_among_outliers():
+    generator = np.random.default_rng(0)
+    up = matrix_from_axis_angle([2.4, 0.1, 0.0]) @ [0, 0, 1.0]
+    plane = generator.uniform(-0.5, 0.5, (2000, 3))
+    plane -= (plane @ up)[:, None] * up
+    clutter = generator.uniform(-0.3, 0.3, (900, 3))
+    clutter += np.maximum(0.05 - clutter @ up, 0)[:, None] * up
+    points = np.concatenate([plane, clutter]) + np.array([0, 0, 1.0])
+    normal, origin = fit_table(points, generator)
+    assert np.degrees(np.arccos(min(normal @ up, 1))) < 0.5
+    assert abs((origin - [0, 0, 1.0]) @ up) < 1e-3
+    with pytest.raises(InvalidArgumentError, match="up_camera_hint"):
+        fit_table(points, generator, -up)
+
+
+def test_large_top_of_an_object_is_not_the_table():
+    generator = np.random.default_rng(0)
+    up = np.array([0, -1.0, 0])
+    table = generator.uniform(-0.5, 0.5, (1000, 3)) * [1, 0, 1] + [0, 0.3, 1.2]
+    top = generator.uniform(-0.3, 0.3, (1600, 3)) * [1, 0, 1] + [0, 0.1, 1.2]
+    _, origin = fit_table(np.concatenate([table, top]), generator, up)
+    assert origin[1] == pytest.approx(0.3, abs=1e-3)
+
+
+def test_object_is_separated_from_the_table(sample):
+    view = segment_object(sample.depth, sample.intrinsics, sample.rgb, rng=rng())
+    truth = sample.part_mask > 0
+    assert np.sum(view.mask & truth) / np.sum(view.mask | truth) > 0.85
+    np.testing.assert_allclose(view.up_camera, sample.R_level_camera[2], atol=0.01)
+    assert view.points_camera.shape == (view.mask.sum(), 3)
+    np.testing.assert_array_equal(view.colors, sample.rgb[view.mask])
+
+
+def test_excluded_pixels_stay_out(sample):
+    exclude = np.zeros(sample.depth.shape, bool)
+    exclude[:, :60] = True
+    view = segment_object(
+        sample.depth, sample.intrinsics, sample.rgb, exclude_mask=exclude, rng=rng()
+    )
+    assert not (view.mask & exclude).any()
+
+
+def test_empty_table_is_refused(sample):
+    points_up = sample.R_level_camera[2]
+    v, u = np.mgrid[: sample.depth.shape[0], : sample.depth.shape[1]] + 0.5
+    K = sample.intrinsics
+    rays = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)], axis=-1)
+    depth = -0.5 / (rays @ points_up)
+    depth[(depth < 0) | (depth > 3)] = 0
+    with pytest.raises(InvalidArgumentError, match="stand out above the table"):
+        segment_object(depth, K, sample.rgb, rng=rng())
+
+
+def test_blind_camera_is_refused(sample):
+    with pytest.raises(InvalidArgumentError, match="0 valid pixels"):
+        segment_object(np.zeros_like(sample.depth), sample.intrinsics, sample.rgb, rng=rng())
+
+
+def test_images_of_different_sizes_are_refused(sample):
+    with pytest.raises(InvalidArgumentError, match="same size"):
+        segment_object(sample.depth[:-1], sample.intrinsics, sample.rgb, rng=rng())
+
+
+def test_prediction_is_complete_and_repeatable(perception, sample):
+    first, view = perception.perceive(sample.rgb, sample.depth, sample.intrinsics, rng=rng())
+    again, _ = perception.perceive(sample.rgb, sample.depth, sample.intrinsics, rng=rng())
+    np.testing.assert_array_equal(first.grasps.scores, again.grasps.scores)
+    np.testing.assert_array_equal(first.points_camera, view.points_camera[first.point_index])
+    np.testing.assert_allclose(first.part_probability.sum(axis=1), 1.0, rtol=1e-5)
+    assert len(first.part_boxes) == len(first.object_boxes) == len(first.joints) == 2
+    grasps = first.grasps
+    assert 0 < len(grasps.scores) <= 16
+    assert (np.diff(grasps.scores) <= 0).all()
+    assert ((grasps.scores >= 0) & (grasps.scores <= 1)).all()
+    np.testing.assert_allclose(np.linalg.det(grasps.R_camera_grasp), 1.0)
+    assert set(grasps.of_part(1).parts) <= {1}
+
+
+def test_proposals_differ_from_one_another(perception, sample):
+    prediction, _ = perception.perceive(sample.rgb, sample.depth, sample.intrinsics, rng=rng())
+    grasps, config = prediction.grasps, perception.proposals
+    apart = np.linalg.norm(grasps.points_camera[:, None] - grasps.points_camera, axis=-1)
+    turned = grasp_angle(grasps.R_camera_grasp[:, None], grasps.R_camera_grasp[None])
+    near = (apart < config.distance) & (turned < config.angle)
+    assert near.sum() == len(grasps.scores)  # each with itself
+
+
+def test_the_best_of_near_grasps_is_kept():
+    points = np.array([[0, 0, 0], [0.001, 0, 0], [1, 0, 0]], dtype=float)
+    rotations = np.stack([np.eye(3)] * 3)
+    np.testing.assert_array_equal(diverse(points, rotations, ProposalConfig()), [0, 2])
+
+
+def test_point_grasps_and_ranked_grasps_agree(perception, sample):
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    ranked = perception.predict(*seen, rng=rng()).grasps
+    everywhere = perception.point_grasps(*seen, top=1, rng=rng())
+    scores = everywhere.affordance * everywhere.scores[:, 0]
+    best = int(np.argmax(scores))
+    assert ranked.scores[0] == pytest.approx(scores[best], rel=1e-4)
+    assert grasp_angle(ranked.R_camera_grasp[0], everywhere.R_camera_grasp[best, 0]) < 1e-3
+
+
+def test_few_points_are_refused(perception, sample):
+    with pytest.raises(InvalidArgumentError, match=r"shape \(10, 3\)"):
+        perception.predict(
+            sample.points_camera[:10], sample.colors[:10], sample.R_level_camera, rng=rng()
+        )
+
+
+def test_a_small_cloud_is_filled_up(perception, sample):
+    prediction = perception.predict(
+        sample.points_camera[:200], sample.colors[:200], sample.R_level_camera, rng=rng()
+    )
+    assert len(prediction.points_camera) == 512
+    assert set(prediction.point_index) == set(range(200))
+
+
+def test_joint_votes_survive_outliers():
+    generator = np.random.default_rng(0)
+    axis, pivot = np.array([0, 0.6, 0.8]), np.array([0.1, 0.2, 0.5])
+    axes = np.tile(axis, (100, 1))
+    pivots = pivot + generator.normal(scale=0.02, size=(100, 1)) * axis
+    axes[:30], pivots[:30] = generator.normal(size=(30, 3)), generator.normal(size=(30, 3))
+    type_log = np.log(np.tile([0.1, 0.1, 0.8], (100, 1)))
+    joint = _joint_from_votes(type_log, axes, pivots, pivots, np.ones(100))
+    assert joint.joint_type == 1
+    assert np.degrees(np.arccos(min(joint.axis_camera @ axis, 1.0))) < 3
+    assert np.linalg.norm(np.cross(joint.pivot_camera - pivot, axis)) < 0.02
+    fixed = _joint_from_votes(type_log[:, ::-1], axes, pivots, pivots, np.ones(100))
+    assert fixed.joint_type == JOINT_NONE
+
+
+def test_evaluation_gives_every_metric(perception, sample):
+    row = evaluate_sample(perception, sample, rng())
+    assert 0 <= row["part_miou"] <= 1
+    assert 0 <= row["affordance_miou"] <= 1
+    for source in ("network", "normal_grid_roll", "normal_random_roll", "random_hemisphere"):
+        assert 0 <= row[f"grasp_all/{source}/error_deg"] <= 90
+    assert 0 < row["label_density"] <= row["label_density_graspable"] <= 1
+
+
+def test_predict_command(perception, sample, tmp_path, capsys):
+    weights = tmp_path / "toy.safetensors"
+    save_model(weights, perception.model, {})
+    Image.fromarray(sample.rgb).save(tmp_path / "rgb.png")
+    depth_mm = (sample.depth * 1000).round().astype(np.uint16)
+    Image.fromarray(depth_mm).save(tmp_path / "depth.png")
+    (tmp_path / "K.json").write_text(json.dumps(sample.intrinsics.tolist()))
+    arguments = ["predict", "--weights", weights, "--rgb", tmp_path / "rgb.png"]
+    arguments += ["--depth", tmp_path / "depth.png", "--intrinsics", tmp_path / "K.json"]
+    arguments += ["--picture", tmp_path / "seen.png", "--grasps", 3]
+    assert cli.main([str(a) for a in arguments]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["category"] == "toy"
+    assert len(report["grasps"]) == 3
+    assert read_rgb(tmp_path / "seen.png").shape == (120, 480, 3)
+
+
+def test_predict_command_names_what_it_cannot_read(tmp_path, capsys):
+    (tmp_path / "rgb.png").write_bytes(b"no image")
+    arguments = ["predict", "--weights", "w.safetensors", "--rgb", str(tmp_path / "rgb.png")]
+    arguments += ["--depth", "d.npy", "--intrinsics", "K.txt"]
+    assert cli.main(arguments) == 1
+    assert "rgb.png" in capsys.readouterr().err

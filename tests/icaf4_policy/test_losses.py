@@ -1,0 +1,139 @@
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from torch.nn import functional as F
+
+from artgym.errors import InvalidArgumentError
+from artgym.geometry.rotations import grasp_angle
+from icaf4_policy.anchors import axis_anchors, grasps_from_residuals
+from icaf4_policy.losses import LossWeights, loss_terms, total_loss
+from icaf4_policy.model import Outputs
+from icaf4_policy.targets import DrawConfig, draw_batch, successful_grasps, targets_from_sample
+from tests.icaf4_policy.toy import toy_sample
+
+UNIT = 0.25
+SURE = 50.0
+
+
+@pytest.fixture
+def batch():
+    targets = [targets_from_sample(toy_sample(i), axis_anchors(45), 512) for i in range(2)]
+    draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
+    return draw_batch(targets, draw, [np.random.default_rng(i) for i in range(2)])
+
+
+def truthful_outputs(batch):
+    residuals = torch.zeros(*batch.anchor_mask.shape, 4)
+    residuals.view(-1, 4)[batch.match_index] = batch.match_residual
+    sure = {
+        name: SURE * F.one_hot(getattr(batch, name).clamp(max=limit), limit + 1).float()
+        for name, limit in (("part", 1), ("affordance", 1), ("joint_type", 2))
+    }
+    return Outputs(
+        segmentation=sure["part"],
+        npcs=batch.npcs[:, :, None].expand(-1, -1, 2, -1),
+        naocs=batch.naocs[:, :, None].expand(-1, -1, 2, -1),
+        affordance=sure["affordance"],
+        joint_type=sure["joint_type"],
+        joint_axis=batch.joint_axis,
+        joint_offset=batch.joint_offset / UNIT,
+        grasp_points=batch.grasp_points,
+        anchors=SURE * (2 * batch.anchor_mask - 1),
+        residuals=residuals,
+    )
+
+
+def test_every_loss_is_zero_at_the_truth(batch):
+    terms = loss_terms(truthful_outputs(batch), batch, UNIT)
+    assert set(terms) == {f.name for f in dataclasses.fields(LossWeights)}
+    for name, term in terms.items():
+        assert term.item() == pytest.approx(0.0, abs=1e-6), name
+    assert total_loss(terms, LossWeights()).item() == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("output", "loss"),
+    [
+        ("segmentation", "segmentation"),
+        ("npcs", "npcs"),
+        ("naocs", "naocs"),
+        ("affordance", "affordance"),
+        ("joint_type", "joint_type"),
+        ("joint_axis", "joint_axis"),
+        ("joint_offset", "joint_offset"),
+        ("anchors", "anchors"),
+        ("residuals", "residuals"),
+    ],
+)
+def test_a_wrong_output_raises_its_own_loss_alone(batch, output, loss):
+    truth = truthful_outputs(batch)
+    wrong = dataclasses.replace(truth, **{output: 0.3 - getattr(truth, output)})
+    terms = loss_terms(wrong, batch, UNIT)
+    assert terms.pop(loss) > 0.05
+    assert all(term < 1e-6 for term in terms.values())
+
+
+def test_unknown_affordance_is_ignored(batch):
+    unknown = dataclasses.replace(batch, affordance=torch.full_like(batch.affordance, 255))
+    terms = loss_terms(truthful_outputs(batch), unknown, UNIT)
+    assert terms["affordance"] == 0
+
+
+def test_other_parts_channels_and_unmatched_residuals_are_free(batch):
+    truth = truthful_outputs(batch)
+    other = F.one_hot(1 - batch.part, 2)[..., None]
+    unmatched = (1 - batch.anchor_mask)[..., None]
+    free = dataclasses.replace(
+        truth, npcs=truth.npcs + other, residuals=truth.residuals + unmatched
+    )
+    assert total_loss(loss_terms(free, batch, UNIT), LossWeights()) < 1e-5
+
+
+def test_targets_give_back_successful_grasps(batch):
+    sample = toy_sample(0)
+    anchors = axis_anchors(45)
+    row, R_level_grasp = successful_grasps(sample)
+    targets = targets_from_sample(sample, anchors, 512)
+    for g in range(len(sample.grasp_part)):
+        block = slice(targets.match_start[g], targets.match_start[g + 1])
+        matched = targets.match_anchor[block]
+        assert len(set(matched)) == len(matched)
+        if not (row == g).any():
+            assert len(matched) == 0
+            continue
+        rebuilt = grasps_from_residuals(anchors[matched], targets.match_residual[block])
+        distances = grasp_angle(rebuilt[:, None], R_level_grasp[row == g][None])
+        assert distances.min(axis=1).max() < 0.005
+        nearest = grasp_angle(R_level_grasp[row == g][:, None], anchors[None]).argmin(axis=1)
+        assert set(nearest) == set(matched)
+
+
+def test_joint_offsets_lead_to_the_axis(batch):
+    revolute = batch.joint_type == 2
+    target = batch.points_level + batch.joint_offset
+    # All points of one lid name points of one line: they differ along the axis alone.
+    reached, axis = target[0][revolute[0]], batch.joint_axis[0][revolute[0]][0]
+    off_axis = torch.linalg.cross(reached - reached[0], axis.expand_as(reached))
+    assert off_axis.norm(dim=-1).max() < 1e-5
+
+
+def test_weights_must_be_finite():
+    with pytest.raises(InvalidArgumentError, match="npcs=nan"):
+        LossWeights(npcs=float("nan"))
+
+
+def test_a_sample_without_any_success_can_be_trained_on():
+    sample = toy_sample(0)
+    hopeless = dataclasses.replace(
+        sample,
+        grasp_bits=np.zeros_like(sample.grasp_bits),
+        affordance=np.zeros_like(sample.affordance),
+        grasp_row=np.full_like(sample.grasp_row, -1),
+    )
+    draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
+    targets = targets_from_sample(hopeless, axis_anchors(45), 512)
+    batch = draw_batch([targets], draw, [np.random.default_rng(0)])
+    terms = loss_terms(truthful_outputs(batch), batch, UNIT)
+    assert total_loss(terms, LossWeights()).item() == pytest.approx(0.0, abs=1e-5)

@@ -1,0 +1,125 @@
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from artgym.errors import InvalidArgumentError
+from icaf4_policy.anchors import axis_anchors
+from icaf4_policy.backbone.pointnet2 import BackboneConfig
+from icaf4_policy.losses import LossWeights, loss_terms, total_loss
+from icaf4_policy.model import Icaf4, ModelConfig
+from icaf4_policy.targets import DrawConfig, draw_batch, targets_from_sample
+from tests.icaf4_policy.toy import toy_sample
+
+SMALL = ModelConfig(
+    category="toy",
+    num_parts=2,
+    length_unit=0.25,
+    num_points=256,
+    backbone=BackboneConfig(centers=(64, 16), neighbors=8),
+)
+DRAW = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
+
+
+def toy_batch(count=2):
+    targets = [targets_from_sample(toy_sample(i), axis_anchors(45), 512) for i in range(count)]
+    return draw_batch(targets, DRAW, [np.random.default_rng(i) for i in range(count)])
+
+
+@pytest.fixture
+def network():
+    torch.manual_seed(0)
+    return Icaf4(SMALL)
+
+
+def tensors(record):
+    return {f.name: getattr(record, f.name) for f in dataclasses.fields(record)}
+
+
+def test_shapes(network):
+    batch = toy_batch()
+    outputs = network(batch.points_level, batch.colors, batch.grasp_points)
+    shapes = {name: tuple(value.shape) for name, value in tensors(outputs).items()}
+    assert shapes == {
+        "segmentation": (2, 256, 2),
+        "npcs": (2, 256, 2, 3),
+        "naocs": (2, 256, 2, 3),
+        "affordance": (2, 256, 2),
+        "joint_type": (2, 256, 3),
+        "joint_axis": (2, 256, 3),
+        "joint_offset": (2, 256, 3),
+        "grasp_points": (2, 48),
+        "anchors": (2, 48, 72),
+        "residuals": (2, 48, 72, 4),
+    }
+
+
+@torch.no_grad()
+def test_order_of_points_does_not_matter(network):
+    batch = toy_batch()
+    network.eval()
+    order = torch.randperm(256, generator=torch.Generator().manual_seed(1))
+    everyone = torch.arange(256).expand(2, -1)
+    straight = network(batch.points_level, batch.colors, everyone)
+    shuffled = network(batch.points_level[:, order], batch.colors[:, order], everyone)
+    for name, value in tensors(straight).items():
+        if name != "grasp_points":
+            torch.testing.assert_close(
+                value[:, order], getattr(shuffled, name), rtol=1e-4, atol=1e-5, msg=name
+            )
+
+
+@torch.no_grad()
+def test_grasp_points_can_be_left_to_the_affordance(network):
+    batch = toy_batch()
+    network.eval()
+    outputs = network(batch.points_level, batch.colors, 16)
+    margin = outputs.affordance[..., 1] - outputs.affordance[..., 0]
+    threshold = margin.gather(1, outputs.grasp_points).amin(dim=1)
+    assert ((margin > threshold[:, None]).sum(dim=1) < 16).all()
+    same = network(batch.points_level, batch.colors, outputs.grasp_points)
+    torch.testing.assert_close(same.anchors, outputs.anchors)
+
+
+def test_training_step_does_not_write_to_its_batch(network):
+    batch = toy_batch()
+    before = {name: value.clone() for name, value in tensors(batch).items()}
+    outputs = network(batch.points_level, batch.colors, batch.grasp_points)
+    total_loss(loss_terms(outputs, batch, SMALL.length_unit), LossWeights()).backward()
+    for name, value in tensors(batch).items():
+        assert torch.equal(value, before[name]), name
+
+
+def test_every_weight_receives_a_gradient(network):
+    batch = toy_batch()
+    outputs = network(batch.points_level, batch.colors, batch.grasp_points)
+    total_loss(loss_terms(outputs, batch, SMALL.length_unit), LossWeights()).backward()
+    for name, weight in network.named_parameters():
+        assert weight.grad is not None, name
+        assert weight.grad.abs().sum() > 0, name
+
+
+def test_overfits_one_sample(network):
+    batch = toy_batch(1)
+    optimizer = torch.optim.Adam(network.parameters(), lr=3e-3)
+    history = []
+    for _ in range(150):
+        outputs = network(batch.points_level, batch.colors, batch.grasp_points)
+        terms = loss_terms(outputs, batch, SMALL.length_unit)
+        loss = total_loss(terms, LossWeights())
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        history.append({name: term.item() for name, term in terms.items()})
+    for name, first in history[0].items():
+        assert history[-1][name] < 0.15 * first, name
+    assert (outputs.segmentation.argmax(dim=-1) == batch.part).float().mean() > 0.99
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("num_parts", 0), ("length_unit", 0.0), ("num_points", 32)]
+)
+def test_impossible_configurations_are_refused(field, value):
+    with pytest.raises(InvalidArgumentError, match=f"{field}={value}"):
+        dataclasses.replace(SMALL, **{field: value})

@@ -1,0 +1,178 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from artgym.datasets.files import Manifest, ShardEntry, write_samples
+from artgym.errors import DamagedFileError, InvalidArgumentError
+from icaf4_policy import cli
+from icaf4_policy.backbone.pointnet2 import BackboneConfig
+from icaf4_policy.checkpoint import description_path, load_model, save_model
+from icaf4_policy.model import Icaf4, ModelConfig
+from icaf4_policy.training import TrainingConfig, resume_path, train
+from tests.icaf4_policy.toy import toy_sample
+
+CONFIG = TrainingConfig(
+    category="toy",
+    epochs=3,
+    batch_size=2,
+    num_points=512,
+    num_grasp_points=32,
+    validate_every=1,
+    precision="float32",
+)
+SMALL = ModelConfig(
+    category="toy",
+    num_parts=2,
+    length_unit=0.25,
+    num_points=256,
+    backbone=BackboneConfig(centers=(64, 16), neighbors=8),
+)
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return [toy_sample(i) for i in range(4)], [toy_sample(100)]
+
+
+def test_interrupted_training_ends_with_the_same_bytes(tmp_path, samples):
+    straight, broken = tmp_path / "straight.safetensors", tmp_path / "broken.safetensors"
+    train(CONFIG, *samples, straight)
+    train(CONFIG, *samples, broken, stop_after_epoch=1)
+    assert resume_path(broken).exists()
+    assert not broken.exists()
+    train(CONFIG, *samples, broken)
+    assert not resume_path(broken).exists()
+    assert broken.read_bytes() == straight.read_bytes()
+    assert description_path(broken).read_text() == description_path(straight).read_text()
+
+
+def test_global_random_state_is_left_alone_and_not_read(tmp_path, samples):
+    config = dataclasses.replace(CONFIG, epochs=1)
+    files = [tmp_path / "a.safetensors", tmp_path / "b.safetensors"]
+    for seed, file in enumerate(files):
+        torch.manual_seed(seed)
+        np.random.seed(seed)  # noqa: NPY002
+        before = torch.get_rng_state()
+        train(config, *samples, file)
+        assert torch.equal(before, torch.get_rng_state())
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_resuming_another_run_is_refused(tmp_path, samples):
+    weights = tmp_path / "toy.safetensors"
+    train(CONFIG, *samples, weights, stop_after_epoch=1)
+    other = dataclasses.replace(CONFIG, learning_rate=1e-4)
+    with pytest.raises(InvalidArgumentError, match=r"toy\.resume\.safetensors"):
+        train(other, *samples, weights)
+
+
+def test_damaged_resume_file_is_named(tmp_path, samples):
+    weights = tmp_path / "toy.safetensors"
+    train(CONFIG, *samples, weights, stop_after_epoch=1)
+    whole = resume_path(weights).read_bytes()
+    resume_path(weights).write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(DamagedFileError, match=r"toy\.resume\.safetensors"):
+        train(CONFIG, *samples, weights)
+
+
+def test_both_splits_must_be_there(tmp_path, samples):
+    with pytest.raises(InvalidArgumentError, match="0 validation samples"):
+        train(CONFIG, samples[0], [], tmp_path / "toy.safetensors")
+
+
+def test_train_command(tmp_path, samples, capsys):
+    for split, part in zip(("train", "val"), samples, strict=True):
+        folder = tmp_path / "data" / "toy" / split
+        write_samples(folder / "0000.h5", part)
+        shard = ShardEntry.of(folder / "0000.h5", len(part))
+        Manifest(config={}, planned=1, shards=(shard,)).write(folder)
+    weights = tmp_path / "weights" / "toy.safetensors"
+    arguments = ["train", "--category", "toy", "--data", str(tmp_path / "data")]
+    arguments += ["--out", str(weights), "--epochs", "1", "--num-points", "512"]
+    arguments += ["--num-grasp-points", "32", "--batch-size", "2"]
+    assert cli.main(arguments) == 0
+    assert str(weights) in capsys.readouterr().out
+    _, description = load_model(weights)
+    assert description["training"]["config"]["num_points"] == 512
+
+
+@pytest.fixture
+def saved(tmp_path):
+    torch.manual_seed(0)
+    model = Icaf4(SMALL).eval()
+    weights = tmp_path / "toy.safetensors"
+    save_model(weights, model, {"note": "untrained"})
+    return model, weights
+
+
+def test_save_and_load_is_bit_exact(saved):
+    model, weights = saved
+    loaded, description = load_model(weights)
+    assert loaded.config == model.config
+    assert description["training"] == {"note": "untrained"}
+    for name, tensor in model.state_dict().items():
+        assert torch.equal(tensor, loaded.state_dict()[name]), name
+    cloud = torch.randn(1, 256, 3, generator=torch.Generator().manual_seed(1))
+    with torch.no_grad():
+        a, b = model(cloud, cloud.sigmoid()), loaded(cloud, cloud.sigmoid())
+    assert torch.equal(a.residuals, b.residuals)
+
+
+def cut_short(weights):
+    weights.write_bytes(weights.read_bytes()[:-100])
+
+
+def flip_a_bit(weights):
+    data = bytearray(weights.read_bytes())
+    data[-50] ^= 1
+    weights.write_bytes(data)
+
+
+def empty(weights):
+    weights.write_bytes(b"")
+
+
+@pytest.mark.parametrize("damage", [cut_short, flip_a_bit, empty, lambda w: w.unlink()])
+def test_damaged_weights_are_named(saved, damage):
+    _, weights = saved
+    damage(weights)
+    with pytest.raises(DamagedFileError, match=r"toy\.safetensors"):
+        load_model(weights)
+
+
+def without_format(description):
+    del description["format"]
+
+
+def of_the_future(description):
+    description["format"] = 99
+
+
+def of_another_network(description):
+    description["model"]["num_parts"] = 5
+
+
+def with_nonsense(description):
+    description["model"]["backbone"] = "large"
+
+
+@pytest.mark.parametrize(
+    "damage", [without_format, of_the_future, of_another_network, with_nonsense]
+)
+def test_descriptions_that_do_not_fit_are_named(saved, damage):
+    _, weights = saved
+    description = json.loads(description_path(weights).read_text())
+    damage(description)
+    description_path(weights).write_text(json.dumps(description))
+    with pytest.raises(DamagedFileError, match=r"toy\.(json|safetensors)"):
+        load_model(weights)
+
+
+def test_unreadable_description_is_named(saved):
+    _, weights = saved
+    description_path(weights).write_bytes(b"\xff{")
+    with pytest.raises(DamagedFileError, match=r"toy\.json"):
+        load_model(weights)
