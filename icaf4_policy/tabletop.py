@@ -21,7 +21,7 @@ HINT_TOLERANCE = np.radians(25.0)
 #: Distance of a plane's inliers, metres; it grows with the square of the depth, as noise does.
 _PLANE_TOLERANCE = 0.004
 #: Pieces nearer than this to the chosen one belong to the same object, metres.
-_SAME_OBJECT_GAP = 0.03
+_SAME_OBJECT_GAP = 0.10
 #: Pieces with fewer pixels are noise.
 _SMALLEST_PIECE = 20
 #: A seen object has at least this many points.

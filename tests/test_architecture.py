@@ -23,7 +23,14 @@ ALLOWED_IMPORTS = {
     "artgym.tasks": ("artgym.tasks", "artgym.objects", "artgym.geometry", "artgym.errors"),
     "artgym.sim": ("artgym.sim", "artgym.objects", "artgym.geometry", "artgym.errors"),
     "artgym": ("artgym",),
-    "icaf4_policy": ("icaf4_policy", "artgym.geometry", "artgym.datasets", "artgym.errors"),
+    "artgym.control": ("artgym.control", "artgym.geometry", "artgym.errors"),
+    "icaf4_policy": (
+        "icaf4_policy",
+        "artgym.control",
+        "artgym.geometry",
+        "artgym.datasets",
+        "artgym.errors",
+    ),
     "benchmarks": ("benchmarks", "artgym", "icaf4_policy"),
 }
 # Who may import the simulator, by prefix of the module's name.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -54,8 +54,8 @@ class AnnotationConfig:
     points: int = 48
     views: int = 8
     yaw: float = 0.35
-    filter: FilterConfig = FilterConfig()
-    trial: TrialConfig = TrialConfig()
+    filter: FilterConfig = field(default_factory=FilterConfig)
+    trial: TrialConfig = field(default_factory=TrialConfig)
     seed: int = 0
 
     @property

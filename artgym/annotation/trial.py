@@ -8,7 +8,7 @@ attempt succeeds if the part moves through half its range held between the finge
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ class TrialConfig:
         stride: simulator steps between two looks at the contacts.
     """
 
-    physics: PhysicsConfig = PhysicsConfig()
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     standoff: float = 0.06
     speed: float = 0.4
     close_time: float = 0.2

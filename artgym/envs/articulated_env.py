@@ -434,7 +434,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         fraction = options.get("open_fraction")
         if fraction is not None and not 0.0 <= float(fraction) <= 1.0:
             raise InvalidArgumentError(
-                f"options['open_fraction']={fraction}: expected a number from 0 (closed) to 1 (open)"
+                f"options['open_fraction']={fraction}: expected 0 (closed) to 1 (open)"
             )
         return options.get("object_id"), None if fraction is None else float(fraction)
 
@@ -502,7 +502,7 @@ def _checked_action(action: NDArray[np.float32]) -> Array:
         raise InvalidArgumentError(f"action={action!r}: expected 7 numbers in [-1, 1]") from error
     if numbers.shape != (7,):
         raise InvalidArgumentError(
-            f"action of shape {numbers.shape}: expected (7,), translation (3), rotation (3), jaws (1)"
+            f"action of shape {numbers.shape}: expected (7,): translation, rotation, jaws"
         )
     if not np.all(np.isfinite(numbers)):
         raise InvalidArgumentError(f"action={numbers.tolist()}: expected finite numbers in [-1, 1]")

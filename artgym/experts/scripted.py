@@ -14,6 +14,7 @@ from artgym.control import GraspExecutor, GraspPlan
 from artgym.envs.articulated_env import ArtOpenEnv
 from artgym.geometry import transforms
 from artgym.geometry.grasps import T_GRASP_TCP, candidate_rotations
+from artgym.geometry.rotations import matrix_from_axis_angle
 
 Array = NDArray[np.floating]
 
@@ -65,19 +66,27 @@ class ScriptedExpert:
         )
 
     def _working_grasp(self) -> Array:
-        """``T_object_grasp`` (4, 4)."""
+        """``T_object_grasp`` (4, 4): one that also succeeds a little off its pose, if there is."""
         env = self._env
         obj, part, q = env.object, env.target_part, env.joint_positions()
+        working: list[Array] = []
         for _ in range(3):
             points, normals = visible_points(obj, q, part, self._points, 4, 0.35, self._rng)
             R_grasps = candidate_rotations(normals)
             possible = np.argwhere(judge(obj, q, part, points, R_grasps) == Verdict.POSSIBLE)
-            # Upright hands first: they come from where there is room.
-            height = R_grasps[possible[:, 0], possible[:, 1], 2, 2]
-            order = np.argsort(np.abs(height + 0.5), kind="stable")
-            chosen = self._rng.permutation(order[: 4 * self._trials])[: self._trials]
-            for i, c in possible[chosen]:
+            for i, c in self._rng.permutation(possible)[: self._trials]:
                 T_object_grasp = transforms.transform_from(R_grasps[i, c], points[i])
-                if try_grasp(obj, q, part, T_object_grasp).success:
+                if not try_grasp(obj, q, part, T_object_grasp).success:
+                    continue
+                working.append(T_object_grasp)
+                nearby = [T_object_grasp @ self._small_motion() for _ in range(2)]
+                if all(try_grasp(obj, q, part, T).success for T in nearby):
                     return T_object_grasp
+            if working:
+                return working[0]
         return T_object_grasp
+
+    def _small_motion(self) -> Array:
+        """A rigid motion (4, 4) of about 4 mm and 4 degrees."""
+        turn = matrix_from_axis_angle(self._rng.normal(0.0, 0.04, 3))
+        return transforms.transform_from(turn, self._rng.normal(0.0, 0.0025, 3))

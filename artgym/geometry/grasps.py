@@ -57,7 +57,7 @@ def candidate_rotations(normals: ArrayLike) -> Array:
     ``NUM_ROLLS`` rolls. A pure function of the normal, so labels need only keep one bit a try.
 
     Returns:
-        (..., NUM_CANDIDATES, 3, 3) in the frame of the normals; index = approach * NUM_ROLLS + roll.
+        (..., NUM_CANDIDATES, 3, 3), frame of the normals; index = approach * NUM_ROLLS + roll.
     """
     R_frame = frame_from_z(-np.asarray(normals, dtype=float))
     return R_frame[..., None, :, :] @ _CANDIDATES_ABOUT_Z

@@ -12,7 +12,7 @@ Array = NDArray[np.floating]
 
 
 def transform_from(R_a_b: ArrayLike, t_a_b: ArrayLike) -> Array:
-    """Builds ``T_a_b`` (..., 4, 4) from a rotation (..., 3, 3) and the origin of b in a (..., 3)."""
+    """Builds ``T_a_b`` (..., 4, 4) from a rotation (..., 3, 3) and b's origin in a (..., 3)."""
     R = np.asarray(R_a_b, dtype=float)
     t = np.asarray(t_a_b, dtype=float)
     T = np.zeros((*np.broadcast_shapes(R.shape[:-2], t.shape[:-1]), 4, 4))

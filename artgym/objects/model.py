@@ -186,15 +186,15 @@ class Joint:
 
     @property
     def range(self) -> float:
-        """open - closed; metres or radians."""
+        """From closed to open; metres or radians."""
         return self.open - self.closed
 
     def open_fraction(self, q: Any) -> Any:
-        """f = (q - closed) / (open - closed)."""
+        """The open fraction f = (q - closed) / (open - closed)."""
         return (q - self.closed) / self.range
 
     def position(self, fraction: Any) -> Any:
-        """q at an open fraction."""
+        """The joint position q at an open fraction."""
         return self.closed + fraction * self.range
 
     def motion(self, q: float | Array) -> Array:

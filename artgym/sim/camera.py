@@ -108,7 +108,7 @@ class RenderedCamera:
         rgb = (np.clip(color, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
         # Positions come in integer millimetres, the camera looking along -z.
         position_mm = self._camera.get_picture("PositionSegmentation")
-        depth = position_mm[..., 2] * np.float32(-1e-3)
+        depth = position_mm[..., 2].astype(np.float32) * np.float32(-1e-3)
         depth[(depth < NEAR) | (depth > FAR)] = 0.0
         return rgb, depth
 

@@ -7,7 +7,7 @@ costs about a millisecond.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import sapien
@@ -40,7 +40,7 @@ class PhysicsConfig:
 
     timestep: float = 1.0 / 120.0
     position_iterations: int = 15
-    hand: HandControl = HandControl()
+    hand: HandControl = field(default_factory=HandControl)
 
 
 @dataclass(frozen=True)
