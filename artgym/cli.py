@@ -140,6 +140,8 @@ def generate(
     """
     from artgym.datasets.generate import GenerationConfig, generate_split
 
+    # A wrong name shall be called that, and not a lack of labels.
+    _catalogue_ids(category, split, None)
     folder = out / category / split
     manifest = generate_split(
         category,

@@ -48,6 +48,10 @@ class DamagedFileError(ArtgymError):
     """A file of ours cannot be read as what it should be; the message names it."""
 
 
+class FileNotWrittenError(ArtgymError, OSError):
+    """The system refused to write a file: disk full, read-only, no such place."""
+
+
 class MissingDependencyError(ArtgymError, ImportError):
     """A package or system library is missing; the message says how to install it."""
 

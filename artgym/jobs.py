@@ -25,16 +25,15 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from artgym.datasets.files import (
+from artgym.errors import ArtgymError, FileNotWrittenError, InvalidArgumentError
+from artgym.files import (
     MANIFEST_NAME,
-    FileNotWrittenError,
     Manifest,
     ShardEntry,
     remove_stale_temporaries,
     require_shard_name,
-    write_samples,
+    write_arrays,
 )
-from artgym.errors import ArtgymError, InvalidArgumentError
 
 #: How many worker processes one shard may take down before it is set aside.
 MAX_DEATHS = 3
@@ -76,7 +75,7 @@ def run_shards(
     folder: str | os.PathLike[str],
     *,
     config: Mapping[str, Any],
-    write: Callable[[Path, Any], None] = write_samples,
+    write: Callable[[Path, Any], None] = write_arrays,
     workers: int = 1,
     backend: str = "loky",
     progress: bool = True,

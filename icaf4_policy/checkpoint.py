@@ -14,8 +14,8 @@ import safetensors
 import safetensors.torch
 from torch import Tensor
 
-from artgym.datasets.files import write_file_whole
 from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.files import write_file_whole
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.model import Icaf4, ModelConfig
 

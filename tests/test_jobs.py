@@ -13,16 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from artgym import jobs
-from artgym.datasets import files
-from artgym.datasets.files import (
-    MANIFEST_NAME,
-    FileNotWrittenError,
-    Manifest,
-    read_arrays,
-    write_arrays,
-)
-from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym import files, jobs
+from artgym.errors import DamagedFileError, FileNotWrittenError, InvalidArgumentError
+from artgym.files import MANIFEST_NAME, Manifest, read_arrays, write_arrays
 from artgym.jobs import MAX_DEATHS, ShardsFailedError, ShardTask, run_shards
 
 CONFIG = {"seed": 3}
@@ -31,7 +24,7 @@ CONFIG = {"seed": 3}
 DEMO = """
 import sys, time
 import numpy as np
-from artgym.datasets.files import write_arrays
+from artgym.files import write_arrays
 from artgym.jobs import ShardTask, run_shards
 
 def make(seed):

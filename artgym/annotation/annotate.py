@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from artgym.annotation.filter import FilterConfig, Verdict, judge
 from artgym.annotation.trial import TrialConfig, try_grasp
-from artgym.datasets.files import Manifest, read_arrays, write_arrays
+from artgym.files import Manifest, read_arrays, write_arrays
 from artgym.geometry import transforms
 from artgym.geometry.grasps import NUM_CANDIDATES, candidate_rotations
 from artgym.jobs import ShardTask, run_shards

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from artgym.annotation.annotate import MOVABLE_PART, Labels, labelled_ids, read_labels
-from artgym.datasets.files import Manifest
 from artgym.datasets.sample import (
     AFFORDANCE_NO,
     AFFORDANCE_UNKNOWN,
@@ -23,7 +22,9 @@ from artgym.datasets.sample import (
     Sample,
     level_from_camera,
 )
+from artgym.datasets.sample_files import write_samples
 from artgym.errors import InvalidArgumentError
+from artgym.files import Manifest
 from artgym.geometry import transforms
 from artgym.geometry.camera import points_from_depth
 from artgym.geometry.rotations import matrix_from_axis_angle
@@ -283,6 +284,7 @@ def generate_split(
         tasks,
         _samples_task,
         folder,
+        write=write_samples,
         config={"generation": asdict(config), "category": category, "split": split},
         workers=workers,
         progress=progress,

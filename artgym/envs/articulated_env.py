@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
@@ -277,7 +278,8 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
 
         if self._is_unstable():
             # Nothing of a blow-up is shown: the last sound state stands in for it.
-            return self._last_observation, 0.0, False, True, dict(self._last_info, unstable=True)
+            info = copy.deepcopy(self._last_info) | {"unstable": True}
+            return copy.deepcopy(self._last_observation), 0.0, False, True, info
         contact = scene.contact(self.target_part)
         q = float(scene.body.positions()[self.target_part - 1])
         self._progress = self._progress.advance(
@@ -431,12 +433,16 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
     def _read_options(self, options: Mapping[str, Any]) -> tuple[str | None, float | None]:
         for key in options:
             _require_known("reset option", key, ("object_id", "open_fraction"))
-        fraction = options.get("open_fraction")
-        if fraction is not None and not 0.0 <= float(fraction) <= 1.0:
+        asked = options.get("open_fraction")
+        try:
+            fraction = None if asked is None else float(asked)
+        except (TypeError, ValueError):
+            fraction = np.nan
+        if fraction is not None and not 0.0 <= fraction <= 1.0:
             raise InvalidArgumentError(
-                f"options['open_fraction']={fraction}: expected 0 (closed) to 1 (open)"
+                f"options['open_fraction']={asked!r}: expected 0 (closed) to 1 (open)"
             )
-        return options.get("object_id"), None if fraction is None else float(fraction)
+        return options.get("object_id"), fraction
 
     def _require_running(self, what: str) -> None:
         if self._scene is None:

@@ -15,22 +15,20 @@ import h5py
 import numpy as np
 import pytest
 
-from artgym.datasets import files
-from artgym.datasets.files import (
+from artgym import files
+from artgym.datasets import sample_files
+from artgym.datasets.sample import ARRAY_FIELDS
+from artgym.datasets.sample_files import SampleFolder, read_samples, write_samples
+from artgym.errors import DamagedFileError, FileNotWrittenError, InvalidArgumentError
+from artgym.files import (
     MANIFEST_NAME,
-    FileNotWrittenError,
     Manifest,
-    SampleFolder,
     ShardEntry,
     read_arrays,
-    read_samples,
     remove_stale_temporaries,
     write_arrays,
     write_file_whole,
-    write_samples,
 )
-from artgym.datasets.sample import ARRAY_FIELDS
-from artgym.errors import DamagedFileError, InvalidArgumentError
 from tests.datasets.sample_factory import random_sample
 
 CONFIG = {"seed": 7, "camera": {"width": 32, "height": 24}, "categories": ["laptop"]}
@@ -112,8 +110,8 @@ class TestWholeFiles:
 
 class TestSamples:
     def test_every_field_has_a_declared_shape(self):
-        assert tuple(files._SAMPLE_SHAPES) == ARRAY_FIELDS
-        assert set(files._SAMPLE_DTYPES) == set(ARRAY_FIELDS)
+        assert tuple(sample_files._SAMPLE_SHAPES) == ARRAY_FIELDS
+        assert set(sample_files._SAMPLE_DTYPES) == set(ARRAY_FIELDS)
 
     @pytest.mark.parametrize(
         "sizes",

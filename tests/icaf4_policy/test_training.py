@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 import torch
 
-from artgym.datasets.files import Manifest, ShardEntry, write_samples
+from artgym.datasets.sample_files import write_samples
 from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.files import Manifest, ShardEntry
 from icaf4_policy import cli
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model

@@ -11,31 +11,30 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
-import math
 import operator
 import os
 import re
 import secrets
-from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from itertools import accumulate
 from pathlib import Path
-from typing import Any, get_args, get_type_hints, overload
+from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from artgym.datasets.sample import ARRAY_FIELDS, Sample
-from artgym.errors import ArtgymError, DamagedFileError, InvalidArgumentError
-from artgym.geometry.grasps import NUM_CANDIDATES
+from artgym.errors import (
+    ArtgymError,
+    DamagedFileError,
+    FileNotWrittenError,
+    InvalidArgumentError,
+)
 
 #: Raised by one with each change of the layout that an older reader cannot read.
 SCHEMA_VERSION = 1
 
-SAMPLES_FORMAT = "artgym-samples"
 ARRAYS_FORMAT = "artgym-arrays"
 FOLDER_FORMAT = "artgym-folder"
 
@@ -46,61 +45,14 @@ MAX_ARRAY_BYTES = 2**31
 
 #: Arrays up to this size lie uncompressed in the object header, under its checksum.
 _INLINE_BYTES = 1024
-#: gzip levels: samples are many and written once each, label files are few and shipped.
-_SAMPLES_LEVEL, _ARRAYS_LEVEL = 1, 9
+#: gzip level: these files are few and shipped.
+_ARRAYS_LEVEL = 9
 
 _TEMPORARY_PREFIX, _TEMPORARY_SUFFIX = ".artgym-", ".tmp"
 _NAME_PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,199}")
-_REMEDY = "Copy it again, or repeat the command that made the folder: it replaces damaged files."
-
-#: Shapes of a sample's arrays; equal letters are equal sizes within one sample.
-_SAMPLE_SHAPES: dict[str, tuple[int | str, ...]] = {
-    "rgb": ("H", "W", 3),
-    "depth": ("H", "W"),
-    "part_mask": ("H", "W"),
-    "intrinsics": (3, 3),
-    "R_level_camera": (3, 3),
-    "points_camera": ("M", 3),
-    "colors": ("M", 3),
-    "part": ("M",),
-    "npcs": ("M", 3),
-    "naocs": ("M", 3),
-    "affordance": ("M",),
-    "grasp_row": ("M",),
-    "grasp_bits": ("G", math.ceil(NUM_CANDIDATES / 8)),
-    "grasp_points_part": ("G", 3),
-    "grasp_normals_part": ("G", 3),
-    "grasp_part": ("G",),
-    "T_camera_parts": ("K", 4, 4),
-    "part_centers": ("K", 3),
-    "part_scales": ("K",),
-    "T_camera_object": (4, 4),
-    "T_object_rest_parts": ("K", 4, 4),
-    "object_center": (3,),
-    "object_scale": (),
-    "joint_type": ("K",),
-    "joint_axis_camera": ("K", 3),
-    "joint_pivot_camera": ("K", 3),
-    "open_fraction": ("K",),
-}
-
-
-def _annotated_dtype(annotation: Any) -> np.dtype[Any]:
-    """The dtype inside an ``NDArray[...]`` annotation."""
-    _, dtype = get_args(annotation)
-    return np.dtype(get_args(dtype)[0])
-
-
-_SAMPLE_DTYPES = {
-    name: _annotated_dtype(annotation)
-    for name, annotation in get_type_hints(Sample).items()
-    if name in ARRAY_FIELDS
-}
-
-
-class FileNotWrittenError(ArtgymError, OSError):
-    """The system refused to write a file: disk full, read-only, no such place."""
-
+DAMAGE_REMEDY = (
+    "Copy it again, or repeat the command that made the folder: it replaces damaged files."
+)
 
 # --- Whole files ---------------------------------------------------------------------------------
 
@@ -179,41 +131,6 @@ def file_sha256(path: str | os.PathLike[str]) -> str:
 # --- Shards --------------------------------------------------------------------------------------
 
 
-def write_samples(path: str | os.PathLike[str], samples: Iterable[Sample]) -> None:
-    """Writes samples to one shard.
-
-    Raises:
-        InvalidArgumentError: an array has the wrong dtype or shape, or is not finite; the message
-            names the sample and the field.
-        FileNotWrittenError: the system refused.
-    """
-
-    def fill(file: h5py.File) -> None:
-        for index, sample in enumerate(samples):
-            arrays = {name: np.asarray(getattr(sample, name)) for name in ARRAY_FIELDS}
-            if misfit := _sample_misfit(arrays):
-                raise InvalidArgumentError(
-                    f"sample {index} ({sample.object_id}) cannot be written to {path}: {misfit}."
-                )
-            group = file.create_group(_sample_name(index))
-            _put_text(group, "object_id", sample.object_id)
-            for name, array in arrays.items():
-                _put_array(group, name, array, level=_SAMPLES_LEVEL)
-
-    write_file_whole(path, _file_image(SAMPLES_FORMAT, fill))
-
-
-def read_samples(path: str | os.PathLike[str]) -> list[Sample]:
-    """Reads all samples of one shard.
-
-    Raises:
-        DamagedFileError: the file is missing, cut short or not what it should be.
-        InvalidArgumentError: it was written with another schema version.
-    """
-    with _opened(path, SAMPLES_FORMAT) as file:
-        return [_get_sample(file, index) for index in range(len(file))]
-
-
 def write_arrays(
     path: str | os.PathLike[str],
     arrays: Mapping[str, NDArray[Any]],
@@ -232,7 +149,7 @@ def write_arrays(
     """
 
     def fill(file: h5py.File) -> None:
-        _put_text(file, "attributes", _json_text("attributes", attributes or {}))
+        put_text(file, "attributes", _json_text("attributes", attributes or {}))
         for name in sorted(arrays):
             array = np.asarray(arrays[name])
             if array.dtype.kind not in "biuf":
@@ -251,9 +168,9 @@ def write_arrays(
                     "'.', '_', '-' between slashes, and no other array's name before a slash."
                 )
             group = file.require_group("/".join(parts[:-1])) if len(parts) > 1 else file
-            _put_array(group, parts[-1], array, level=_ARRAYS_LEVEL)
+            put_array(group, parts[-1], array, level=_ARRAYS_LEVEL)
 
-    write_file_whole(path, _file_image(ARRAYS_FORMAT, fill))
+    write_file_whole(path, hdf5_image(ARRAYS_FORMAT, fill))
 
 
 def read_arrays(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -263,42 +180,18 @@ def read_arrays(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], 
         DamagedFileError: the file is missing, cut short or not what it should be.
         InvalidArgumentError: it was written with another schema version.
     """
-    with _opened(path, ARRAYS_FORMAT) as file:
+    with opened(path, ARRAYS_FORMAT) as file:
         arrays: dict[str, NDArray[Any]] = {}
 
         def visit(name: str, item: h5py.Dataset | h5py.Group) -> None:
             if isinstance(item, h5py.Dataset):
-                arrays[name] = _dataset_array(name, item)
+                arrays[name] = dataset_array(name, item)
 
         file.visititems(visit)
-        return dict(sorted(arrays.items())), json.loads(_get_text(file, "attributes"))
+        return dict(sorted(arrays.items())), json.loads(get_text(file, "attributes"))
 
 
-def _sample_name(index: int) -> str:
-    return f"{index:06d}"
-
-
-def _sample_misfit(arrays: Mapping[str, NDArray[Any]]) -> str | None:
-    """What keeps ``arrays`` from being a sample, None where nothing does."""
-    sizes: dict[str, int] = {}
-    for name, symbols in _SAMPLE_SHAPES.items():
-        array = arrays[name]
-        if array.dtype != _SAMPLE_DTYPES[name]:
-            return f"{name} should be {_SAMPLE_DTYPES[name]}, got {array.dtype}"
-        # zip is allowed to cut short: the comparison below sees the number of axes.
-        for symbol, size in zip(symbols, array.shape, strict=False):
-            if isinstance(symbol, str):
-                sizes.setdefault(symbol, size)
-        expected = tuple(sizes.get(s, s) if isinstance(s, str) else s for s in symbols)
-        if array.shape != expected:
-            wanted = ", ".join(map(str, expected))
-            return f"{name} should have shape ({wanted}), got {array.shape}"
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            return f"{name} holds values that are not finite"
-    return None
-
-
-def _file_image(file_format: str, fill: Callable[[h5py.File], None]) -> bytes:
+def hdf5_image(file_format: str, fill: Callable[[h5py.File], None]) -> bytes:
     """The bytes of an HDF5 file that ``fill`` fills.
 
     Built in memory, because HDF5 answers a full disk with files that it can no longer close. The
@@ -315,14 +208,15 @@ def _file_image(file_format: str, fill: Callable[[h5py.File], None]) -> bytes:
         libver=("v110", "v110"),
         track_times=False,
     ) as file:
-        _put_text(file, "format", file_format)
+        put_text(file, "format", file_format)
         file.attrs["schema_version"] = np.int32(SCHEMA_VERSION)
         fill(file)
         file.flush()
         return file.id.get_file_image()
 
 
-def _put_array(group: h5py.Group, name: str, array: NDArray[Any], *, level: int) -> None:
+def put_array(group: h5py.Group, name: str, array: NDArray[Any], *, level: int) -> None:
+    """Writes an array, gzipped at ``level`` where it is large; equal arrays give equal bytes."""
     properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     properties.set_obj_track_times(False)
     if array.nbytes <= _INLINE_BYTES:
@@ -343,25 +237,26 @@ def _put_array(group: h5py.Group, name: str, array: NDArray[Any], *, level: int)
         dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, np.require(array, requirements="C"))
 
 
-def _put_text(item: h5py.Group, name: str, text: str) -> None:
+def put_text(item: h5py.Group, name: str, text: str) -> None:
     """Text of fixed length: the variable kind lies in a heap that no checksum covers."""
     encoded = text.encode()
     dtype = h5py.string_dtype("utf-8", max(len(encoded), 1))
     item.attrs.create(name, np.array(encoded, dtype=dtype))
 
 
-def _get_text(item: h5py.Group, name: str) -> str:
+def get_text(item: h5py.Group, name: str) -> str:
+    """Reads what ``put_text`` wrote."""
     return bytes(item.attrs[name]).decode()
 
 
 @contextmanager
-def _opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File]:
+def opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File]:
     """One of our HDF5 files; whatever goes wrong inside becomes one error that names it."""
     try:
         # Files never change once they have their name, so that they need no lock; and some network
         # file systems have none to give.
         with h5py.File(path, "r", locking=False) as file:
-            if _get_text(file, "format") != file_format:
+            if get_text(file, "format") != file_format:
                 raise DamagedFileError(f"its format is not {file_format!r}")
             version = int(file.attrs["schema_version"])
             if version != SCHEMA_VERSION:
@@ -370,9 +265,9 @@ def _opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.Fil
     except InvalidArgumentError:
         raise
     except FileNotFoundError as error:
-        raise DamagedFileError(f"{path} is missing. {_REMEDY}") from error
+        raise DamagedFileError(f"{path} is missing. {DAMAGE_REMEDY}") from error
     except (DamagedFileError, OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
-        raise DamagedFileError(f"{path} is damaged: {error}. {_REMEDY}") from error
+        raise DamagedFileError(f"{path} is damaged: {error}. {DAMAGE_REMEDY}") from error
 
 
 def _version_message(path: str | os.PathLike[str], version: object) -> str:
@@ -382,24 +277,13 @@ def _version_message(path: str | os.PathLike[str], version: object) -> str:
     )
 
 
-def _dataset_array(name: str, item: h5py.Dataset) -> NDArray[Any]:
+def dataset_array(name: str, item: h5py.Dataset) -> NDArray[Any]:
+    """An array as it is stored; refuses what is no plain array, or claims to be huge."""
     if item.dtype.kind not in "biuf" or item.external or item.is_virtual:
         raise DamagedFileError(f"{name} is not a plain array of numbers")
     if item.nbytes > MAX_ARRAY_BYTES:
         raise DamagedFileError(f"{name} claims {item.nbytes} bytes")
     return np.asarray(item[()])
-
-
-def _get_sample(file: h5py.File, index: int) -> Sample:
-    group = file[_sample_name(index)]
-    arrays = {}
-    for name in ARRAY_FIELDS:
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise DamagedFileError(f"sample {index} has no array {name!r}")
-        arrays[name] = _dataset_array(name, group[name])
-    if misfit := _sample_misfit(arrays):
-        raise DamagedFileError(f"sample {index}: {misfit}")
-    return Sample(object_id=_get_text(group, "object_id"), **arrays)
 
 
 def _json_text(what: str, value: Mapping[str, Any]) -> str:
@@ -574,66 +458,3 @@ def _differences(name: str, present: Any, wanted: Any) -> list[str]:
     if present == wanted:
         return []
     return [f"{name} is {present!r} in the folder, {wanted!r} asked"]
-
-
-class SampleFolder(Sequence[Sample]):
-    """The samples of a folder of shards, each read when asked for.
-
-    No file stays open between two samples, so that it can be pickled, forked and shared between
-    threads. Sizes are checked at once, the checksum of a shard when its first sample is read.
-
-    Args:
-        folder: where ``manifest.json`` lies.
-        allow_incomplete: take what is there of a folder whose making has not finished.
-
-    Raises:
-        DamagedFileError: the manifest or a shard is missing or damaged.
-        InvalidArgumentError: another schema version, or shards are still to be made.
-    """
-
-    def __init__(self, folder: str | os.PathLike[str], *, allow_incomplete: bool = False) -> None:
-        self.folder = Path(folder)
-        self.manifest = Manifest.read(folder)
-        if not (self.manifest.is_complete or allow_incomplete):
-            raise InvalidArgumentError(
-                f"{folder} holds {len(self.manifest.shards)} of {self.manifest.planned} shards. "
-                "Repeat the command that makes it, or pass allow_incomplete=True."
-            )
-        for shard in self.manifest.shards:
-            path = self.folder / shard.name
-            size = path.stat().st_size if path.is_file() else None
-            if size != shard.bytes:
-                found = "it is missing" if size is None else f"it has {size}"
-                raise DamagedFileError(
-                    f"{path} is damaged: expected {shard.bytes} bytes, {found}. {_REMEDY}"
-                )
-        # Index of the first sample of each shard, and one past the last sample of all.
-        self._starts = [0, *accumulate(shard.items for shard in self.manifest.shards)]
-        self._verified: set[str] = set()
-
-    def __len__(self) -> int:
-        """The number of samples."""
-        return self._starts[-1]
-
-    @overload
-    def __getitem__(self, index: int) -> Sample: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Sample]: ...
-    def __getitem__(self, index: int | slice) -> Sample | list[Sample]:
-        """One sample, or the list of a slice."""
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        position = operator.index(index)
-        if position < 0:
-            position += len(self)
-        if not 0 <= position < len(self):
-            raise IndexError(f"index {index} is outside the {len(self)} samples of {self.folder}")
-        number = bisect_right(self._starts, position) - 1
-        shard = self.manifest.shards[number]
-        path = self.folder / shard.name
-        if shard.name not in self._verified:
-            if damage := shard.damage(self.folder):
-                raise DamagedFileError(f"{path} {damage}. {_REMEDY}")
-            self._verified.add(shard.name)
-        with _opened(path, SAMPLES_FORMAT) as file:
-            return _get_sample(file, position - self._starts[number])

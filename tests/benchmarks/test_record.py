@@ -1,0 +1,27 @@
+"""Result files."""
+
+import json
+from pathlib import Path
+
+from benchmarks.record import provenance, write_result
+
+
+def test_result_is_plain_json(tmp_path):
+    path = tmp_path / "deep" / "result.json"
+    write_result(
+        path, {"nan": float("nan"), "pair": (1, 2), "path": Path("a/b"), "rows": [{"a": 1}] * 200}
+    )
+    result = json.loads(path.read_text())
+    assert result["nan"] is None
+    assert result["pair"] == [1, 2]
+    assert result["path"] == "a/b"
+    assert result["rows"] == [{"a": 1}] * 200
+    # A row a line.
+    assert path.read_text().count("\n") > 200
+
+
+def test_provenance_names_command_and_commit(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["x.py", "--seed", "1"])
+    found = provenance("benchmarks.success_rate")
+    assert found["command"] == "python -m benchmarks.success_rate --seed 1"
+    assert found["git"] is None or len(found["git"]["commit"]) == 40
