@@ -22,6 +22,10 @@ from artgym.tasks.success import TRAVEL_THRESHOLD, Progress
 
 Array = NDArray[np.floating]
 
+#: Joint creep during a trial, see ``sim.scene.JOINT_CREEP``. An attempt takes about a second, in
+#: which this is nothing; the shipped labels were made with it, and their bits depend on it.
+_JOINT_CREEP = 1e-4
+
 _T_GRASP_HAND = transforms.invert(T_hand_grasp)
 
 
@@ -96,7 +100,14 @@ def try_grasp(
     tick = config.physics.timestep * stride
     T_object_hand = T_object_grasp @ _T_GRASP_HAND
     approach = _approach_path(T_object_hand, config.standoff, config.speed * tick)
-    scene = ManipulationScene(obj, np.eye(4), q, T_world_hand=approach[0], config=config.physics)
+    scene = ManipulationScene(
+        obj,
+        np.eye(4),
+        q,
+        T_world_hand=approach[0],
+        config=config.physics,
+        joint_creep=_JOINT_CREEP,
+    )
     hand = scene.hand
     assert hand is not None
     progress = Progress.begin(float(joint.open_fraction(q[part - 1])))

@@ -22,7 +22,7 @@ from artgym.objects.model import ArticulatedObject, Material
 from artgym.sim import rays
 from artgym.sim.camera import RenderedCamera, View, ViewDistribution, add_lights
 from artgym.sim.conversion import pose_from_transform
-from artgym.sim.renderer import render_system
+from artgym.sim.renderer import own_render_system
 from artgym.sim.robots import T_hand_tcp
 from artgym.sim.scene import ManipulationScene, PartContact, PhysicsConfig
 from artgym.tasks import rewards
@@ -144,7 +144,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self.observation_space = observation_space(obs_mode, camera_size, num_points, num_parts)
         # One renderer serves observations and render(); state mode alone needs none.
         self._needs_renderer = obs_mode == "rgbd" or render_mode == "rgb_array"
-        self._render_system = render_system() if self._needs_renderer else None
+        self._render_system = own_render_system() if self._needs_renderer else None
         self._scene: ManipulationScene | None = None
         self._closed = False
 

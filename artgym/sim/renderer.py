@@ -1,7 +1,8 @@
-"""Finds a device that can render, and holds this process's one RenderSystem.
+"""Finds a device that can render, and makes RenderSystems on it.
 
-The first picture of a RenderSystem costs seconds, every later camera, object or scene
-milliseconds: so there is one a process, shared by fresh scenes.
+The first picture of a process costs seconds, every later RenderSystem, camera, object or scene
+milliseconds. What shares a RenderSystem is seen together, so scenes that are open at the same
+time need one each.
 """
 
 from __future__ import annotations
@@ -33,10 +34,24 @@ def find_device() -> str:
 def render_system() -> sapien.render.RenderSystem:
     """The RenderSystem of this process, made at the first call.
 
+    Scenes on one RenderSystem see each other's objects and lights: it is for scenes of which one
+    is closed before the next is built.
+
     Raises:
         RendererUnavailableError: no device can render; the message says what to install.
     """
     return _device_and_system()[1]
+
+
+def own_render_system() -> sapien.render.RenderSystem:
+    """A new RenderSystem, for what lives beside other scenes: an environment.
+
+    Only the first picture of a process is slow, so it costs milliseconds.
+
+    Raises:
+        RendererUnavailableError: no device can render; the message says what to install.
+    """
+    return sapien.render.RenderSystem(find_device())
 
 
 @functools.cache

@@ -24,8 +24,9 @@ Array = NDArray[np.floating]
 #: Half the side and half the thickness of the table's top, metres. Its surface is z = 0.
 TABLE_HALF_SIZE = (0.75, 0.75, 0.02)
 
-#: A joint's dry friction is a damper that saturates: at this fraction of the range a second.
-_CREEP = 1e-4
+#: A joint's dry friction is a damper whose force saturates: under a load that the friction holds,
+#: the joint creeps by less than this share of its range a second.
+JOINT_CREEP = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +69,7 @@ class ArticulatedBody:
         *,
         visuals: bool,
         position_iterations: int,
+        joint_creep: float = JOINT_CREEP,
         group: int = 0,
     ) -> None:
         self.model = obj
@@ -96,7 +98,7 @@ class ArticulatedBody:
                 body.joint.limit = np.array([low, high]) - joint.closed
                 # The damper's force saturates at the dry friction, so the joint stays where it
                 # is left and yields to any larger force.
-                slip = _CREEP * abs(joint.range)
+                slip = joint_creep * abs(joint.range)
                 body.joint.set_drive_property(0.0, joint.friction / slip, joint.friction)
             self.links.append(body)
             entities.append(entity)
@@ -138,6 +140,8 @@ class ManipulationScene:
         width: opening of the jaws at the start, metres.
         config: physics.
         render_system: shared renderer; without one the scene has nothing to be seen.
+        table_material: how the table looks.
+        joint_creep: share of its range by which a held joint may creep, a second.
     """
 
     def __init__(
@@ -151,6 +155,7 @@ class ManipulationScene:
         config: PhysicsConfig = PhysicsConfig(),
         render_system: sapien.render.RenderSystem | None = None,
         table_material: Material | None = None,
+        joint_creep: float = JOINT_CREEP,
     ) -> None:
         self.config = config
         systems: list[sapien.System] = [physx.PhysxCpuSystem()]
@@ -168,6 +173,7 @@ class ManipulationScene:
             q,
             visuals=visuals,
             position_iterations=config.position_iterations,
+            joint_creep=joint_creep,
         )
         self.hand: FloatingHand | None = None
         self._hand_links: dict[physx.PhysxArticulationLinkComponent, int] = {}

@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict
 
+import imageio.v3 as iio
 import numpy as np
 import pytest
 
@@ -10,6 +11,8 @@ from artgym.errors import InvalidArgumentError, RendererUnavailableError
 from benchmarks import success_rate
 from benchmarks.episodes import episode_tasks, run_episode, run_in_worker
 from benchmarks.parallel import results_in_order
+from icaf4_policy.checkpoint import save_model
+from icaf4_policy.model import Icaf4, ModelConfig
 
 STILL_POLICY = """
 import numpy as np
@@ -131,3 +134,15 @@ def test_without_a_renderer_nothing_runs(tmp_path, monkeypatch, capsys):
     assert success_rate.main(arguments(tmp_path, "--policy", "zero", "icaf4")) == 1
     assert "no device here can render" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_network_is_scored_shown_and_filmed(tmp_path, render_system):
+    model = Icaf4(ModelConfig(category="drawer", num_parts=2, length_unit=0.2))
+    save_model(tmp_path / "drawer.safetensors", model, {})
+    more = ("--policy", "icaf4", "--weights", str(tmp_path))
+    assert success_rate.main(arguments(tmp_path, *more)) == 0
+    assert (tmp_path / "perception.png").read_bytes().startswith(b"\x89PNG")
+    assert iio.improps(tmp_path / "episode.mp4", plugin="FFMPEG").shape[1:] == (360, 480, 3)
+    result = json.loads((tmp_path / "success_rate.json").read_text())
+    assert [task["seed"] for task in result["shown"]] == [result["episodes"][0]["seed"]]

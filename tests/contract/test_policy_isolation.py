@@ -32,8 +32,13 @@ def weights(tmp_path):
         num_points=512,
         backbone=BackboneConfig(centers=(64, 16), neighbors=8),
     )
+    model = Icaf4(config).eval()
+    with torch.no_grad():
+        # Random, but inclined to see the part and its hinge: else it would never act.
+        model.segmentation.mlp.layers[6].bias[1] += 10.0
+        model.joint.mlp.layers[6].bias[2] += 10.0
     path = tmp_path / "random.safetensors"
-    save_model(path, Icaf4(config).eval(), {})
+    save_model(path, model, {})
     return path
 
 

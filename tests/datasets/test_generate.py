@@ -188,7 +188,7 @@ def test_same_bytes_however_made(labels, tmp_path):
 def test_command_line(labels, tmp_path, capsys):
     command = [
         "generate", "--category", "laptop", "--split", "val", "--labels", str(labels),
-        "--out", str(tmp_path), "--views", "1", "--camera-size", "96", "72",
+        "--out", str(tmp_path), "--views", "1", "--camera-size", "160", "120",
     ]  # fmt: skip
     with pytest.raises(InvalidArgumentError, match=r"min_points=600.*larger picture"):
         make_samples("laptop/1000", GenerationConfig(camera_size=(32, 24)), labels)

@@ -1,0 +1,231 @@
+"""What do the grasp labels hold, and what does chance score on them?
+
+Run ``python -m benchmarks.labels --help``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from artgym.annotation.annotate import (
+    MOVABLE_PART,
+    TRIAL_ENDS,
+    Labels,
+    labelled_ids,
+    read_labels,
+)
+from artgym.annotation.filter import Verdict
+from artgym.errors import ArtgymError, InvalidArgumentError
+from artgym.geometry.grasps import APPROACH_RINGS, NUM_CANDIDATES, NUM_ROLLS, candidate_rotations
+from artgym.objects import catalog
+from benchmarks import record
+from icaf4_policy.metrics import CHANCE_ROWS, grasp_distances
+
+#: Width of the printed tables where they are not shown on a terminal.
+_WIDTH = 120
+#: Grasps that each chance row draws at a point: all rolls of the grid, or as many at random.
+_DRAWS = NUM_ROLLS
+
+
+@dataclass(frozen=True, kw_only=True)
+class LabelsConfig:
+    """What do the grasp labels hold, and what does chance score on them?
+
+    Attributes:
+        category: categories of objects.
+        split: splits; those without labels are left out.
+        labels: folder with {category}/{split}, instead of the shipped labels.
+        seed: of the chance rows.
+        out: folder for labels.json.
+    """
+
+    category: tuple[str, ...] = tuple(catalog.CATEGORIES)
+    split: tuple[catalog.Split, ...] = ("train", "val", "test")
+    labels: Path | None = None
+    seed: int = 0
+    out: Path = record.RESULTS_FOLDER
+
+    def __post_init__(self) -> None:
+        for category in self.category:
+            catalog.category(category)
+
+
+def measure(config: LabelsConfig) -> dict[str, Any]:
+    """Reads all labels; a result for ``record.write_result``.
+
+    Raises:
+        InvalidArgumentError: there are no labels.
+        DamagedFileError: a label file is damaged.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    for category in config.category:
+        for split in config.split:
+            ids = labelled_ids(category, split, config.labels)
+            if ids:
+                bar = tqdm(ids, desc=f"labels {category}/{split}", unit="object", file=sys.stderr)
+                labels = [read_labels(object_id, config.labels) for object_id in bar]
+                rows.setdefault(category, {})[split] = statistics(labels, config.seed)
+    if not rows:
+        raise InvalidArgumentError(
+            f"no labels for {', '.join(config.category)}: run `artgym annotate` first."
+        )
+    return {
+        **record.provenance("benchmarks.labels"),
+        "config": asdict(config),
+        "labels": rows,
+    }
+
+
+def statistics(labels: Sequence[Labels], seed: int) -> dict[str, Any]:
+    """The numbers of one category and split.
+
+    Args:
+        labels: of at least one object.
+        seed: of the chance rows.
+    """
+    success = np.concatenate([one.success.reshape(-1, NUM_CANDIDATES) for one in labels])
+    graspable = success.any(axis=1)
+    verdicts = np.sum([one.verdicts.sum(axis=0) for one in labels], axis=0)
+    ends = np.sum([one.ends.sum(axis=0) for one in labels], axis=0)
+    return {
+        "objects": len(labels),
+        "objects_without_success": sum(not one.success.any() for one in labels),
+        "states": sum(len(one.fractions) for one in labels),
+        "points": len(success),
+        "tries": success.size,
+        "verdicts": {
+            verdict.name.lower().replace("_", " "): int(verdicts[verdict]) for verdict in Verdict
+        },
+        "trial_ends": {end: int(count) for end, count in zip(TRIAL_ENDS, ends, strict=True)},
+        "successes": int(success.sum()),
+        "density": _mean(success),
+        "density_at_graspable_points": _mean(success[graspable]),
+        "graspable_points": _mean(graspable),
+        "rings": _ring_statistics(success, graspable),
+        "chance_deg": _chance(labels, np.random.default_rng(seed)),
+    }
+
+
+def _ring_statistics(
+    success: NDArray[np.bool_], graspable: NDArray[np.bool_]
+) -> list[dict[str, float]]:
+    """Density by the tilt of the approach from the inward normal."""
+    rings, first = [], 0
+    for tilt_deg, directions in APPROACH_RINGS:
+        tries = success[:, first : first + directions * NUM_ROLLS]
+        first += directions * NUM_ROLLS
+        rings.append(
+            {
+                "tilt_deg": tilt_deg,
+                "tries": tries.size,
+                "density": _mean(tries),
+                "density_at_graspable_points": _mean(tries[graspable]),
+                "graspable_points": _mean(tries.any(axis=1)),
+            }
+        )
+    return rings
+
+
+def _chance(labels: Sequence[Labels], rng: np.random.Generator) -> dict[str, dict[str, float]]:
+    """Angle from a grasp of each chance row to the nearest success, over all graspable points.
+
+    Worked out in the object's frame, in which the tries were made.
+    """
+    angles: dict[str, list[float]] = {name: [] for name in CHANCE_ROWS}
+    for one in labels:
+        obj = catalog.load(one.object_id)
+        for state, fraction in enumerate(one.fractions):
+            q = obj.rest_positions.copy()
+            q[MOVABLE_PART - 1] = obj.joint_of(MOVABLE_PART).position(float(fraction))
+            R_object_part = obj.link_poses(q)[MOVABLE_PART][:3, :3]
+            tries = one.success[state]
+            graspable = np.flatnonzero(tries.any(axis=1))
+            if not len(graspable):
+                continue
+            normals = one.normals_part[state][graspable].astype(float) @ R_object_part.T
+            R_tries = candidate_rotations(normals)
+            drawn = {name: draw(normals, _DRAWS, rng) for name, draw in CHANCE_ROWS.items()}
+            for row, point in enumerate(graspable):
+                R_successes = R_tries[row, tries[point]]
+                for name, R_drawn in drawn.items():
+                    nearest = grasp_distances(R_drawn[row], R_successes).min(axis=1)
+                    angles[name].append(float(np.degrees(nearest).mean()))
+    return {
+        name: {"mean": _mean(values), "median_of_points": _median(values)}
+        for name, values in angles.items()
+    }
+
+
+def _mean(values: Any) -> float:
+    """Their mean; NaN of none."""
+    return round(float(np.mean(values)), 5) if np.size(values) else float("nan")
+
+
+def _median(values: Any) -> float:
+    """Their median; NaN of none."""
+    return round(float(np.median(values)), 5) if np.size(values) else float("nan")
+
+
+def statistics_table(labels: dict[str, dict[str, Any]]) -> Table:
+    """All numbers, a column a category and split."""
+    columns = [(c, s, numbers) for c, splits in labels.items() for s, numbers in splits.items()]
+    table = Table(title="grasp labels")
+    table.add_column("")
+    for category, split, _ in columns:
+        table.add_column(f"{category}/{split}", justify="right")
+    for name in ("objects", "objects_without_success", "points", "tries", "successes"):
+        table.add_row(name.replace("_", " "), *(f"{n[name]:,}" for _, _, n in columns))
+    for verdict in columns[0][2]["verdicts"]:
+        shares = (100 * n["verdicts"][verdict] / n["tries"] for _, _, n in columns)
+        table.add_row(f"filter: {verdict}, %", *(f"{share:.1f}" for share in shares))
+    for end in TRIAL_ENDS:
+        counts = (n["trial_ends"][end] for _, _, n in columns)
+        table.add_row(f"trials: {end}", *(f"{count:,}" for count in counts))
+    for name in ("density", "density_at_graspable_points", "graspable_points"):
+        shares = (100 * n[name] for _, _, n in columns)
+        table.add_row(f"{name.replace('_', ' ')}, %", *(f"{share:.1f}" for share in shares))
+    for ring, (tilt_deg, _) in enumerate(APPROACH_RINGS):
+        shares = (100 * n["rings"][ring]["density_at_graspable_points"] for _, _, n in columns)
+        table.add_row(f"  approach tilted {tilt_deg:.0f} deg, %", *(f"{s:.1f}" for s in shares))
+    for name in CHANCE_ROWS:
+        means = (n["chance_deg"][name]["mean"] for _, _, n in columns)
+        table.add_row(f"chance {name}, deg", *(f"{mean:.1f}" for mean in means))
+    return table
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the benchmark, prints its table, writes its result.
+
+    Returns:
+        The exit status: 0 success, 1 failure, 130 interrupted. A command line that cannot be
+        understood ends the process with 2.
+    """
+    try:
+        config = tyro.cli(LabelsConfig, prog="benchmarks.labels", args=arguments)
+        result = measure(config)
+        path = config.out / "labels.json"
+        record.write_result(path, result)
+    except ArtgymError as error:
+        print(f"labels: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("labels: interrupted.", file=sys.stderr)
+        return 130
+    Console(width=None if sys.stdout.isatty() else _WIDTH).print(statistics_table(result["labels"]))
+    print(f"wrote {path}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,82 @@
+"""The same function over many tasks in worker processes, with a bar on stderr."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
+from typing import TypeVar
+
+from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+from tqdm import tqdm
+
+from artgym.errors import ArtgymError, InvalidArgumentError
+
+#: Sums over several threads round differently: with one, results do not depend on the machine.
+_ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "VECLIB")
+}
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class WorkerDiedError(ArtgymError, RuntimeError):
+    """A worker process ended without an answer."""
+
+
+def results_in_order(
+    function: Callable[[T], R],
+    tasks: Sequence[T],
+    *,
+    workers: int,
+    description: str,
+    unit: str,
+) -> list[R]:
+    """``function`` of each task, in the tasks' order, whatever the number of workers.
+
+    Even one worker is a process of its own, so that it has one thread and the same start as any
+    other. Interrupted, or when a task raises, the workers end at once.
+
+    Args:
+        function: importable from a module; what it keeps in a cache, a worker keeps.
+        tasks: small and picklable.
+        workers: processes.
+        description: the bar's label.
+        unit: what a task is.
+
+    Raises:
+        InvalidArgumentError: fewer than one worker.
+        WorkerDiedError: a worker was killed or crashed.
+    """
+    if workers < 1:
+        raise InvalidArgumentError(f"workers={workers}: expected 1 or more.")
+    results: dict[int, R] = {}
+    executor = get_reusable_executor(
+        max_workers=min(workers, max(len(tasks), 1)),
+        reuse=False,
+        initializer=_ignore_interrupt,
+        env=_ONE_THREAD,
+    )
+    try:
+        numbers = {executor.submit(function, task): i for i, task in enumerate(tasks)}
+        bar = tqdm(total=len(tasks), desc=description, unit=unit, file=sys.stderr)
+        with bar:
+            for future in as_completed(numbers):
+                results[numbers[future]] = future.result()
+                bar.update()
+    except TerminatedWorkerError as error:
+        raise WorkerDiedError(
+            "a worker process died (killed by the system, often for want of memory, or crashed in "
+            "native code). Repeat the command with fewer --workers."
+        ) from error
+    finally:
+        executor.shutdown(wait=True, kill_workers=True)
+    return [results[i] for i in range(len(tasks))]
+
+
+def _ignore_interrupt() -> None:
+    # Ctrl-C reaches every process of the terminal; the parent ends its workers itself.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,136 @@
+"""Puts the kept results into the pages that quote them: `python -m benchmarks.report`.
+
+A page says where with a pair of comments, ``<!-- NAME -->`` and ``<!-- /NAME -->``; what stands
+between them is written here from the JSON files of ``benchmarks/results`` and never by hand.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from artgym.errors import DamagedFileError, InvalidArgumentError
+from benchmarks.record import RESULTS_FOLDER
+
+ROOT = Path(__file__).parent.parent
+
+#: Pages with blocks to fill.
+PAGES = (ROOT / "README.md", ROOT / "icaf4_policy" / "weights" / "README.md")
+
+
+def success_rate_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``success_rate.json``, policies by categories."""
+    categories = list(result["rows"])
+    head = "".join(f" {c}: success | gripped | travel |" for c in categories)
+    lines = [f"| policy |{head}", "|---|" + "---|" * (3 * len(categories))]
+    for policy in result["config"]["policy"]:
+        cells = [policy]
+        for category in categories:
+            row = result["rows"][category][policy]
+            low, high = row["success_interval"]
+            cells += [
+                f"{100 * row['success']:.0f} % ({100 * low:.0f}-{100 * high:.0f})",
+                f"{100 * row['success_gripped']:.0f} %",
+                f"{100 * row['travel']:.0f} %",
+            ]
+        lines.append("| " + " | ".join(cells) + " |")
+    config = result["config"]
+    count = config["objects"] * config["episodes"]
+    lines += [
+        "",
+        f"{count} episodes a cell on {config['objects']} {config['split']} objects, none of them "
+        "seen in training; Wilson 95 % intervals in brackets.",
+    ]
+    return "\n".join(lines)
+
+
+#: Rows of the perception table: label, key of the metric, how it is shown, the paper's key.
+_PERCEPTION_ROWS: tuple[tuple[str, str, str, str | None], ...] = (
+    ("part segmentation, mIoU", "part_miou", "{:.3f}", "part_miou"),
+    ("part rotation error, deg", "part_rotation_deg", "{:.1f}", "part_rotation_deg"),
+    ("part translation error, m", "part_translation_m", "{:.4f}", None),
+    ("joint axis error, deg", "joint_axis_deg", "{:.1f}", None),
+    ("affordance, IoU of graspable", "affordance_iou", "{:.3f}", None),
+    ("affordance, mIoU", "affordance_miou", "{:.3f}", "affordance_miou"),
+    ("grasp best-match error, deg", "grasp/network/error_deg", "{:.1f}", "grasp/network/error_deg"),
+    (
+        "the same along the normal, grid roll",
+        "grasp/normal_grid_roll/error_deg",
+        "{:.1f}",
+        None,
+    ),
+    ("the same in a random hemisphere pose", "grasp/random_hemisphere/error_deg", "{:.1f}", None),
+    ("coverage at 15 deg", "grasp/network/coverage@15", "{:.2f}", None),
+    ("tries that succeed at graspable points", "label_density_graspable", "{:.3f}", None),
+)
+
+
+def perception_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``perception.json``, the paper's figures beside ours."""
+    categories = list(result["metrics"])
+    head = "".join(f" {c} | paper |" for c in categories)
+    lines = [f"| on unseen objects |{head}", "|---|" + "---|" * (2 * len(categories))]
+    for label, key, form, paper_key in _PERCEPTION_ROWS:
+        cells = [label]
+        for category in categories:
+            cells.append(form.format(result["metrics"][category][key]))
+            paper = result["paper"].get(category, {}).get(paper_key or "")
+            cells.append("" if paper is None else f"{paper:g}")
+        lines.append("| " + " | ".join(cells) + " |")
+    objects = " and ".join(f"{len(result['objects'][c])} {c}s" for c in categories)
+    lines += [
+        "",
+        f"{objects}, {sum(result['views'].values())} views. The paper's figures are of other "
+        "objects and pictures, and leave the grasp error undefined: a place to stand, no contest.",
+    ]
+    return "\n".join(lines)
+
+
+BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+    "success_rate": success_rate_block,
+    "perception": perception_block,
+}
+
+
+def filled(page: str, results: Path = RESULTS_FOLDER) -> str:
+    """The text of a page with every block written anew.
+
+    Raises:
+        InvalidArgumentError: a block is opened and not closed.
+        DamagedFileError: the result a block quotes is missing or not JSON.
+    """
+    for name, block in BLOCKS.items():
+        start, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+        if start not in page:
+            continue
+        if end not in page:
+            raise InvalidArgumentError(f"{start} is never closed: add {end}.")
+        file = results / f"{name}.json"
+        try:
+            text = block(json.loads(file.read_text(encoding="utf-8")))
+        except (OSError, ValueError, KeyError) as error:
+            raise DamagedFileError(
+                f"{file} cannot be quoted ({type(error).__name__}: {error}); make it again with "
+                f"`python -m benchmarks.{name}`"
+            ) from error
+        before, _, rest = page.partition(start)
+        _, _, after = rest.partition(end)
+        page = f"{before}{start}\n{text}\n{end}{after}"
+    return page
+
+
+def main() -> int:
+    """Fills every page, and says which changed."""
+    for path in PAGES:
+        page = path.read_text(encoding="utf-8")
+        new = filled(page)
+        path.write_text(new, encoding="utf-8")
+        print(f"{path.relative_to(ROOT)}: {'unchanged' if new == page else 'written'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
