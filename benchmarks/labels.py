@@ -27,7 +27,7 @@ from artgym.annotation.annotate import (
 )
 from artgym.annotation.filter import Verdict
 from artgym.errors import ArtgymError, InvalidArgumentError
-from artgym.geometry.grasps import APPROACH_RINGS, NUM_CANDIDATES, NUM_ROLLS, candidate_rotations
+from artgym.geometry.grasps import APPROACH_RINGS, NUM_CANDIDATES, NUM_ROLLS, candidates_of_part
 from artgym.objects import catalog
 from benchmarks import record
 from icaf4_policy.metrics import CHANCE_ROWS, grasp_distances
@@ -153,8 +153,9 @@ def _chance(labels: Sequence[Labels], rng: np.random.Generator) -> dict[str, dic
             graspable = np.flatnonzero(tries.any(axis=1))
             if not len(graspable):
                 continue
-            normals = one.normals_part[state][graspable].astype(float) @ R_object_part.T
-            R_tries = candidate_rotations(normals)
+            R_tries = candidates_of_part(one.normals_part[state][graspable], R_object_part)
+            # The first try of all goes straight against the surface.
+            normals = -R_tries[:, 0, :, 2]
             drawn = {name: draw(normals, _DRAWS, rng) for name, draw in CHANCE_ROWS.items()}
             for row, point in enumerate(graspable):
                 R_successes = R_tries[row, tries[point]]

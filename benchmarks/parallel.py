@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 from typing import TypeVar
@@ -63,7 +64,10 @@ def results_in_order(
     try:
         numbers = {executor.submit(function, task): i for i, task in enumerate(tasks)}
         bar = tqdm(total=len(tasks), desc=description, unit=unit, file=sys.stderr)
-        with bar:
+        with bar, warnings.catch_warnings():
+            # Loky takes the memory of a renderer and a network for a leak, and replaces the
+            # worker between two tasks: nothing is lost.
+            warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
             for future in as_completed(numbers):
                 results[numbers[future]] = future.result()
                 bar.update()

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, JOINT_NONE, Sample
-from artgym.geometry.grasps import candidate_rotations
 from artgym.geometry.transforms import invert, translation
 from icaf4_policy import metrics
 from icaf4_policy.inference import MIN_PART_POINTS, Perception, Prediction
@@ -126,21 +125,20 @@ def _grasp_metrics(
     judged = np.flatnonzero((label >= 0) & tries.any(axis=1)[label])
     if not len(judged):
         return {}
-    R_camera_parts = sample.T_camera_parts[:, :3, :3].astype(float)[
-        sample.grasp_part[label[judged]]
-    ]
-    normals = sample.grasp_normals_part[label[judged]].astype(float)
-    R_camera_candidates = R_camera_parts[:, None] @ candidate_rotations(normals)
-    normals_camera = (R_camera_parts @ normals[..., None])[..., 0]
-    proposals = {"network": points.R_camera_grasp[judged]}
+    # All in the object's frame, in which the tries were made.
+    R_object_tries = sample.tried_rotations()[label[judged]]
+    # The first try of all goes straight against the surface.
+    normals_object = -R_object_tries[:, 0, :, 2]
+    R_object_camera = sample.T_camera_object[:3, :3].astype(float).T
+    proposals = {"network": R_object_camera @ points.R_camera_grasp[judged]}
     for name, propose in metrics.CHANCE_ROWS.items():
-        proposals[name] = propose(normals_camera, top, rng)
+        proposals[name] = propose(normals_object, top, rng)
     called = points.affordance[judged] > 0.5
     row: dict[str, float] = {"grasp_points_called": float(called.mean())}
     for name, R_proposals in proposals.items():
         scores = []
         for i in range(len(judged)):
-            R_successes = R_camera_candidates[i, tries[label[judged[i]]]]
+            R_successes = R_object_tries[i, tries[label[judged[i]]]]
             distances = metrics.grasp_distances(R_proposals[i], R_successes)
             scores.append(metrics.grasp_scores(distances))
         for prefix, chosen in (("grasp", called), ("grasp_all", np.ones_like(called))):

@@ -15,7 +15,6 @@ from artgym.datasets.sample import (
     JOINT_REVOLUTE,
     Sample,
 )
-from artgym.geometry.grasps import candidate_rotations
 from icaf4_policy.anchors import match_anchors
 from icaf4_policy.cloud import choose_points, level_points
 
@@ -61,10 +60,8 @@ def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.flo
         The labelled point of each (n,), ascending, and ``R_level_grasp`` (n, 3, 3).
     """
     row, attempt = np.nonzero(sample.successful_tries())
-    labelled, inverse = np.unique(row, return_inverse=True)
-    R_part_grasp = candidate_rotations(sample.grasp_normals_part[labelled])[inverse, attempt]
-    R_level_parts = sample.R_level_camera.astype(float) @ sample.T_camera_parts[:, :3, :3]
-    return row, R_level_parts[sample.grasp_part[row]] @ R_part_grasp
+    R_level_object = sample.R_level_camera.astype(float) @ sample.T_camera_object[:3, :3]
+    return row, R_level_object @ sample.tried_rotations()[row, attempt]
 
 
 def targets_from_sample(sample: Sample, anchors: NDArray[np.floating], max_points: int) -> Targets:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artgym.errors import InvalidArgumentError
-from artgym.geometry.grasps import NUM_CANDIDATES
+from artgym.geometry.grasps import NUM_CANDIDATES, candidates_of_part
 
 #: Codes of ``Sample.joint_type``.
 JOINT_NONE, JOINT_PRISMATIC, JOINT_REVOLUTE = -1, 0, 1
@@ -45,7 +45,7 @@ class Sample:
         grasp_row: int32 (M,): the nearest labelled surface point of the same part, an index into
             the four arrays below, -1 where none lies near.
         grasp_bits: uint8 (G, C / 8): success of each of the C = ``NUM_CANDIDATES`` tries of
-            ``geometry.grasps.candidate_rotations``, ``np.unpackbits(..., bitorder="little")``.
+            ``geometry.grasps.candidates_of_part``, ``np.unpackbits(..., bitorder="little")``.
         grasp_points_part: float32 (G, 3): the labelled points, frame of their part, metres.
         grasp_normals_part: float32 (G, 3): their outward unit normals, same frame.
         grasp_part: uint8 (G,): the part each labelled point lies on.
@@ -99,6 +99,12 @@ class Sample:
         """(G, C): whether each try at each labelled point succeeded."""
         bits = np.unpackbits(self.grasp_bits, axis=1, count=NUM_CANDIDATES, bitorder="little")
         return bits.astype(bool)
+
+    def tried_rotations(self) -> NDArray[np.floating]:
+        """(G, C, 3, 3): the rotation of each try at each labelled point, object frame."""
+        R_camera_object = self.T_camera_object[:3, :3].astype(float)
+        R_object_parts = R_camera_object.T @ self.T_camera_parts[:, :3, :3]
+        return candidates_of_part(self.grasp_normals_part, R_object_parts[self.grasp_part])
 
 
 #: The array fields of a sample, in order: what a file holds beside the object's id.

@@ -61,3 +61,22 @@ def candidate_rotations(normals: ArrayLike) -> Array:
     """
     R_frame = frame_from_z(-np.asarray(normals, dtype=float))
     return R_frame[..., None, :, :] @ _CANDIDATES_ABOUT_Z
+
+
+def candidates_of_part(normals_part: ArrayLike, R_object_part: ArrayLike) -> Array:
+    """The rotations tried at labelled points of a part, which are kept by their normals.
+
+    The tries follow from the normals in the object's frame, as the part stood when they were
+    made. ``candidate_rotations`` jumps where two components of a normal are equal: rounding keeps
+    the last digits of a rotation from deciding it.
+
+    Args:
+        normals_part: outward unit normals (..., 3) in the frame of the part.
+        R_object_part: (3, 3), or (..., 3, 3) for points of several parts.
+
+    Returns:
+        (..., NUM_CANDIDATES, 3, 3) in the object's frame.
+    """
+    R = np.asarray(R_object_part, dtype=float)
+    normals_object = (R @ np.asarray(normals_part, dtype=float)[..., None])[..., 0]
+    return candidate_rotations(normals_object.round(6))

@@ -6,7 +6,7 @@ import numpy as np
 
 from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, Sample, level_from_camera
 from artgym.geometry.camera import intrinsics_from_fov, look_at, project
-from artgym.geometry.grasps import candidate_rotations
+from artgym.geometry.grasps import candidates_of_part
 from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.geometry.screw import joint_motion
 from artgym.geometry.transforms import apply, invert, transform_from, translation
@@ -56,7 +56,9 @@ def toy_sample(seed: int = 0, num_points: int = 700) -> Sample:
     grasp_points_part = np.concatenate([points for points, _ in labels])
     grasp_normals_part = np.concatenate([normals for _, normals in labels])
     # The lid's free half can be held from that side, the jaws closing across its thickness.
-    R_part_grasp = candidate_rotations(grasp_normals_part)
+    R_object_part = T_object_parts[grasp_part, :3, :3]
+    R_object_grasp = candidates_of_part(grasp_normals_part, R_object_part)
+    R_part_grasp = np.swapaxes(R_object_part, -1, -2)[:, None] @ R_object_grasp
     tries = (np.abs(R_part_grasp[..., 2, 1]) > 0.8) & (R_part_grasp[..., 0, 2] < -0.3)
     tries[(grasp_part == 0) | (grasp_points_part[:, 0] < 0)] = False
     squares = ((points_part[:, None] - grasp_points_part) ** 2).sum(-1)
