@@ -184,7 +184,7 @@ def grasp_table(category: str, values: Mapping[str, float]) -> Table:
     for degrees in PRECISION_DEG:
         table.add_column(f"within {degrees} deg", justify="right")
     table.add_column(f"covered at {COVERAGE_DEG} deg", justify="right")
-    for prefix, points in (("grasp", "called graspable"), ("grasp_all", "all")):
+    for prefix, points in (("grasp", "graspable, called so"), ("grasp_calls", "all calls")):
         for source in ("network", *CHANCE_ROWS):
             row = {key: values.get(f"{prefix}/{source}/{key}") for key in _grasp_keys()}
             cells = [_cell(value, 1 if key == "error_deg" else 3) for key, value in row.items()]

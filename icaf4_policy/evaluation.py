@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, JOINT_NONE, Sample
+from artgym.datasets.sample import (
+    AFFORDANCE_NO,
+    AFFORDANCE_UNKNOWN,
+    AFFORDANCE_YES,
+    JOINT_NONE,
+    Sample,
+)
 from artgym.geometry.transforms import invert, translation
 from icaf4_policy import metrics
 from icaf4_policy.inference import MIN_PART_POINTS, Perception, Prediction
@@ -39,8 +45,8 @@ def evaluate_sample(
     Returns:
         A row for ``metrics.mean_rows``; NaN where a metric does not apply. Grasp metrics are over
         the points with successful tries that the network calls graspable
-        (``grasp/network/...``), and over all points with successful tries
-        (``grasp_all/network/...``), each beside its chance rows.
+        (``grasp/network/...``), and over all its calls, where one at a point that offers nothing
+        misses (``grasp_calls/network/...``), each beside its chance rows.
     """
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
     prediction = perception.predict(*seen, rng=rng)
@@ -122,7 +128,8 @@ def _grasp_metrics(
     )
     label = sample.grasp_row[points.point_index]
     tries = sample.successful_tries()
-    judged = np.flatnonzero((label >= 0) & tries.any(axis=1)[label])
+    graspable = (label >= 0) & tries.any(axis=1)[label]
+    judged = np.flatnonzero(graspable)
     if not len(judged):
         return {}
     # All in the object's frame, in which the tries were made.
@@ -134,6 +141,11 @@ def _grasp_metrics(
     for name, propose in metrics.CHANCE_ROWS.items():
         proposals[name] = propose(normals_object, top, rng)
     called = points.affordance[judged] > 0.5
+    # A call at a point that offers nothing is a miss at any angle; where no label lies near,
+    # nothing is known.
+    offers_nothing = sample.affordance[points.point_index] == AFFORDANCE_NO
+    wrong_calls = int(np.sum((points.affordance > 0.5) & offers_nothing))
+    misses = [metrics.MISS] * wrong_calls
     row: dict[str, float] = {"grasp_points_called": float(called.mean())}
     for name, R_proposals in proposals.items():
         scores = []
@@ -141,7 +153,8 @@ def _grasp_metrics(
             R_successes = R_object_tries[i, tries[label[judged[i]]]]
             distances = metrics.grasp_distances(R_proposals[i], R_successes)
             scores.append(metrics.grasp_scores(distances))
-        for prefix, chosen in (("grasp", called), ("grasp_all", np.ones_like(called))):
-            means = metrics.mean_rows(s for s, c in zip(scores, chosen, strict=True) if c)
+        right_calls = [score for score, call in zip(scores, called, strict=True) if call]
+        for prefix, counted in (("grasp", right_calls), ("grasp_calls", right_calls + misses)):
+            means = metrics.mean_rows(counted)
             row |= {f"{prefix}/{name}/{key}": value for key, value in means.items()}
     return row

@@ -75,6 +75,10 @@ def grasp_scores(distances: ArrayLike) -> dict[str, float]:
     return scores
 
 
+#: The scores of a call where no try succeeded: no success to be near to.
+MISS: dict[str, float] = {f"precision@{t}": 0.0 for t in PRECISION_DEG}
+
+
 def normal_on_grid(normals: ArrayLike, count: int, rng: np.random.Generator) -> Array:
     """Chance: approach along the inward normal, rolls of the label grid.
 

@@ -179,7 +179,8 @@ def test_evaluation_gives_every_metric(perception, sample):
     assert 0 <= row["part_miou"] <= 1
     assert 0 <= row["affordance_miou"] <= 1
     for source in ("network", "normal_grid_roll", "normal_random_roll", "random_hemisphere"):
-        assert 0 <= row[f"grasp_all/{source}/error_deg"] <= 180
+        calls, right = (row[f"{name}/{source}/precision@20"] for name in ("grasp_calls", "grasp"))
+        assert 0 <= calls <= right <= 1
     assert 0 < row["label_density"] <= row["label_density_graspable"] <= 1
 
 
