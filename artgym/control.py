@@ -80,14 +80,13 @@ class ExecutorConfig:
 class GraspExecutor:
     """Turns a plan into actions, one a control step.
 
-    ``phase`` is "idle" before a plan is given and after one has ended; ``failed`` then says
-    whether the hand came back empty.
+    ``phase`` is "idle" before a plan is given and after one has ended, whether by the end of the
+    part's range or by jaws that came back empty: only a new look can tell.
     """
 
     def __init__(self, config: ExecutorConfig = ExecutorConfig()) -> None:
         self._config = config
         self.phase: Phase = "idle"
-        self.failed = False
         self._plan: GraspPlan | None = None
         self._elapsed = 0
         self._waited = 0
@@ -99,7 +98,6 @@ class GraspExecutor:
     def begin(self, plan: GraspPlan) -> None:
         """Starts a new plan."""
         self._plan = plan
-        self.failed = False
         self._moved = 0.0
         self._enter("hover")
 
@@ -165,10 +163,7 @@ class GraspExecutor:
             self._enter("close")
         elif self.phase == "close" and self._elapsed >= config.close_steps:
             self._T_grasped = T_world_tcp.copy()
-            if width < config.empty_width:
-                self._give_up()
-            else:
-                self._enter("move")
+            self._enter("release" if width < config.empty_width else "move")
         elif self.phase == "move":
             self._follow_joint(T_world_tcp, width)
         elif self.phase == "release" and self._elapsed >= config.release_steps:
@@ -183,7 +178,7 @@ class GraspExecutor:
         plan, config = self._plan, self._config
         assert plan is not None
         if width < config.empty_width:
-            self._give_up()
+            self._enter("release")
             return
         gap, turn = pose_gap(self._carried(self._moved), T_world_tcp)
         if gap < config.leash and turn < 5 * config.leash and self._moved < plan.displacement:
@@ -195,11 +190,7 @@ class GraspExecutor:
             self._waited = 0
         elif self._waited > config.patience:
             # Held back: at the end of the range, or by a wrong joint.
-            self._give_up(failed=self._moved < 0.9 * plan.displacement)
-
-    def _give_up(self, *, failed: bool = True) -> None:
-        self.failed = failed
-        self._enter("release")
+            self._enter("release")
 
 
 def pose_gap(T_a: Array, T_b: Array) -> tuple[float, float]:
