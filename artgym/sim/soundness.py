@@ -379,7 +379,7 @@ def _opens(obj: ArticulatedObject) -> Verdict:
 
 
 def _no_jam(obj: ArticulatedObject) -> Verdict:
-    """The share of the range covered, to and fro, under a force a hand can give."""
+    """The share of the range covered, back and forth, under a force a hand can give."""
     covered = []
     for part, joint in enumerate(obj.joints, start=1):
         with _FreeObject(obj, part, 0.0) as free:
