@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import h5py
 import numpy as np
@@ -246,7 +246,7 @@ def put_text(item: h5py.Group, name: str, text: str) -> None:
 
 def get_text(item: h5py.Group, name: str) -> str:
     """Reads what ``put_text`` wrote."""
-    return bytes(item.attrs[name]).decode()
+    return bytes(cast(bytes, item.attrs[name])).decode()
 
 
 @contextmanager
@@ -258,7 +258,7 @@ def opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File
         with h5py.File(path, "r", locking=False) as file:
             if get_text(file, "format") != file_format:
                 raise DamagedFileError(f"its format is not {file_format!r}")
-            version = int(file.attrs["schema_version"])
+            version = int(cast(np.integer, file.attrs["schema_version"]))
             if version != SCHEMA_VERSION:
                 raise InvalidArgumentError(_version_message(path, version))
             yield file
@@ -266,7 +266,15 @@ def opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File
         raise
     except FileNotFoundError as error:
         raise DamagedFileError(f"{path} is missing. {DAMAGE_REMEDY}") from error
-    except (DamagedFileError, OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
+    except (
+        AttributeError,
+        DamagedFileError,
+        KeyError,
+        OSError,
+        RuntimeError,
+        TypeError,
+        ValueError,
+    ) as error:
         raise DamagedFileError(f"{path} is damaged: {error}. {DAMAGE_REMEDY}") from error
 
 

@@ -14,11 +14,11 @@ import threading
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -204,7 +204,7 @@ def _outcomes(
     folder: Path,
     workers: int,
     backend: str,
-) -> Iterator[_Outcome]:
+) -> Generator[_Outcome, None, None]:
     """Works through ``tasks``, yielding as they finish."""
     if workers == 1:
         for task in tasks:
@@ -256,7 +256,7 @@ def _parallel_outcomes(
     folder: Path,
     workers: int,
     backend: str,
-) -> Iterator[_Outcome]:
+) -> Generator[_Outcome, None, None]:
     """Outcomes in the order they come; no more than ``workers`` tasks are taken ahead."""
     # Threads are limited at start too: a library that a worker imports late is not seen otherwise.
     options = (
@@ -264,11 +264,13 @@ def _parallel_outcomes(
     )
     with parallel_config(backend=backend, n_jobs=workers, **options):
         parallel = Parallel(
-            return_as="generator_unordered", batch_size=1, pre_dispatch=workers, max_nbytes=None
+            return_as="generator_unordered",
+            batch_size=1,  # pyright: ignore[reportArgumentType]
+            pre_dispatch=workers,  # pyright: ignore[reportArgumentType]
+            max_nbytes=None,
         )
-        with closing(
-            parallel(delayed(_finished_shard)(task, make, write, folder) for task in tasks)
-        ) as outcomes:
+        finished = parallel(delayed(_finished_shard)(task, make, write, folder) for task in tasks)
+        with closing(cast(Generator[_Outcome, None, None], finished)) as outcomes:
             yield from outcomes
 
 

@@ -95,7 +95,7 @@ def statistics(labels: Sequence[Labels], seed: int) -> dict[str, Any]:
         seed: of the chance rows.
     """
     success = np.concatenate([one.success.reshape(-1, NUM_CANDIDATES) for one in labels])
-    graspable = success.any(axis=1)
+    graspable = np.any(success, axis=1)
     verdicts = np.sum([one.verdicts.sum(axis=0) for one in labels], axis=0)
     ends = np.sum([one.ends.sum(axis=0) for one in labels], axis=0)
     return {

@@ -57,7 +57,7 @@ def results_in_order(
     results: dict[int, R] = {}
     executor = get_reusable_executor(
         max_workers=min(workers, max(len(tasks), 1)),
-        reuse=False,
+        reuse=False,  # pyright: ignore[reportArgumentType]
         initializer=_ignore_interrupt,
         env=_ONE_THREAD,
     )

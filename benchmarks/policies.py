@@ -151,7 +151,9 @@ def policy_entry(name: str) -> PolicyEntry:
     obs_mode = getattr(policy_class, "obs_mode", "rgbd")
     if obs_mode not in get_args(ObsMode):
         raise UnknownNameError(f"obs_mode of policy {name}", obs_mode, get_args(ObsMode))
-    return PolicyEntry(obs_mode=obs_mode, make=lambda env, category, weights: _instance(name))
+    return PolicyEntry(
+        obs_mode=cast(ObsMode, obs_mode), make=lambda env, category, weights: _instance(name)
+    )
 
 
 @functools.lru_cache(maxsize=4)

@@ -92,7 +92,9 @@ def save_model(weights: Path, model: Icaf4, facts: Mapping[str, Any]) -> None:
 
 
 def _config_from_json(fields: dict[str, Any]) -> ModelConfig:
-    backbone = {k: tuple(v) if isinstance(v, list) else v for k, v in fields["backbone"].items()}
+    backbone: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in fields["backbone"].items()
+    }
     return ModelConfig(**{**fields, "backbone": BackboneConfig(**backbone)})
 
 

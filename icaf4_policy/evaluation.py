@@ -128,7 +128,7 @@ def _grasp_metrics(
     )
     label = sample.grasp_row[points.point_index]
     tries = sample.successful_tries()
-    graspable = (label >= 0) & tries.any(axis=1)[label]
+    graspable = (label >= 0) & np.any(tries, axis=1)[label]
     judged = np.flatnonzero(graspable)
     if not len(judged):
         return {}

@@ -102,8 +102,9 @@ class Icaf4(nn.Module):
             grasp_points: the points whose grasps are wanted: int64 (B, S), or how many of the
                 points of highest affordance; all when left out.
         """
-        features = self.backbone(points_level / self.config.length_unit, colors - 0.5)  # (B, N, C)
-        affordance = self.affordance(features)
+        # (B, N, C)
+        features: Tensor = self.backbone(points_level / self.config.length_unit, colors - 0.5)
+        affordance: Tensor = self.affordance(features)
         if grasp_points is None:
             grasp_points = features.shape[1]
         if isinstance(grasp_points, int):

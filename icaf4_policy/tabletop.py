@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.camera import points_from_depth
@@ -193,7 +194,8 @@ def _central_object(above: NDArray[np.bool_], points: Array) -> NDArray[np.bool_
     connected = above.copy()
     connected[:, 1:] &= ~(above[:, :-1] & (np.abs(z[:, 1:] - z[:, :-1]) > jump[:, 1:]))
     connected[1:] &= ~(above[:-1] & (np.abs(z[1:] - z[:-1]) > jump[1:]))
-    labels, count = ndimage.label(connected, structure=np.ones((3, 3)))
+    labelled = ndimage.label(connected, structure=np.ones((3, 3)))
+    labels, count = cast(tuple[NDArray[np.int32], int], labelled)
     if count == 0:
         return connected
     pixels = np.flatnonzero(labels)

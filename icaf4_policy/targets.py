@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -174,7 +175,7 @@ def _jittered(
 
 def _draw_one(
     targets: Targets, config: DrawConfig, rng: np.random.Generator
-) -> dict[str, NDArray[np.generic]]:
+) -> dict[str, NDArray[Any]]:
     pick = choose_points(len(targets.points_level), config.num_points, rng)
     points, part = targets.points_level[pick], targets.part[pick]
     colors = targets.colors[pick].astype(np.float32) / 255.0

@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,9 @@ TRIAL_ENDS = ("moved", "not moved", "blocked", "empty")
 _ARRAYS = ("fractions", "points_part", "normals_part", "bits", "verdicts", "ends")
 
 
-def annotate(object_id: str, config: AnnotationConfig = AnnotationConfig()) -> dict[str, Array]:
+def annotate(
+    object_id: str, config: AnnotationConfig = AnnotationConfig()
+) -> dict[str, NDArray[Any]]:
     """Labels one object; the arrays of ``Labels`` by name, a function of id and config alone."""
     obj = catalog.load(object_id)
     category = catalog.category(obj.category)
@@ -114,7 +117,7 @@ def annotate(object_id: str, config: AnnotationConfig = AnnotationConfig()) -> d
 
 def _annotate_state(
     obj: ArticulatedObject, fraction: float, config: AnnotationConfig, rng: np.random.Generator
-) -> tuple[Array, ...]:
+) -> tuple[NDArray[Any], ...]:
     part = MOVABLE_PART
     q = obj.rest_positions.copy()
     q[part - 1] = obj.joint_of(part).position(fraction)
@@ -122,7 +125,7 @@ def _annotate_state(
     R_grasps = candidate_rotations(normals)
     verdicts = judge(obj, q, part, points, R_grasps, config.filter)
     success = np.zeros(verdicts.shape, dtype=bool)
-    ends = dict.fromkeys(TRIAL_ENDS, 0)
+    ends: dict[str, int] = dict.fromkeys(TRIAL_ENDS, 0)
     for i, c in np.argwhere(verdicts == Verdict.POSSIBLE):
         T_object_grasp = transforms.transform_from(R_grasps[i, c], points[i])
         trial = try_grasp(obj, q, part, T_object_grasp, config.trial)
@@ -209,7 +212,7 @@ def annotate_split(
     )
 
 
-def _annotate_task(arguments: tuple[str, AnnotationConfig]) -> dict[str, Array]:
+def _annotate_task(arguments: tuple[str, AnnotationConfig]) -> dict[str, NDArray[Any]]:
     return annotate(*arguments)
 
 

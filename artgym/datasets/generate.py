@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from artgym.annotation.annotate import MOVABLE_PART, Labels, labelled_ids, read_labels
 from artgym.datasets.sample import (

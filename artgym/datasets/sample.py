@@ -119,7 +119,7 @@ def level_from_camera(up_camera: ArrayLike) -> NDArray[np.float64]:
     """
     z = np.asarray(up_camera, dtype=float)
     z = z / np.linalg.norm(z)
-    x = np.array([0.0, 0.0, 1.0]) - z[2] * z
+    x: NDArray[np.float64] = np.array([0.0, 0.0, 1.0]) - z[2] * z
     if np.linalg.norm(x) < 1e-3:
         raise InvalidArgumentError(
             f"up_camera={z.tolist()} is parallel to the viewing direction: the level frame has no "

@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, get_args, get_type_hints, overload
+from typing import Any, cast, get_args, get_type_hints, overload
 
 import h5py
 import numpy as np
@@ -143,12 +143,12 @@ def _sample_misfit(arrays: Mapping[str, NDArray[Any]]) -> str | None:
 
 
 def _get_sample(file: h5py.File, index: int) -> Sample:
-    group = file[_sample_name(index)]
+    group = cast(h5py.Group, file[_sample_name(index)])
     arrays = {}
     for name in ARRAY_FIELDS:
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             raise DamagedFileError(f"sample {index} has no array {name!r}")
-        arrays[name] = dataset_array(name, group[name])
+        arrays[name] = dataset_array(name, cast(h5py.Dataset, group[name]))
     if misfit := _sample_misfit(arrays):
         raise DamagedFileError(f"sample {index}: {misfit}")
     return Sample(object_id=get_text(group, "object_id"), **arrays)

@@ -134,7 +134,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._object_ids = _drawable_ids(categories, split, objects, target_part)
         _require_sizes(camera_size, num_points)
         self.obs_mode = obs_mode
-        self.reward_mode = reward_mode
+        self.reward_mode: RewardMode = reward_mode
         self.render_mode = render_mode
         self.target_part = target_part
         self.camera_size = camera_size

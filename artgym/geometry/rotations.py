@@ -97,11 +97,11 @@ def frame_from_z(z: ArrayLike, roll: ArrayLike = 0.0) -> Array:
     The zero-roll x column is the projection of the world axis least aligned with ``z``, so the
     result is a deterministic function of the direction.
     """
-    z = np.asarray(z, dtype=float)
-    z = z / np.linalg.norm(z, axis=-1, keepdims=True)
-    helper = np.eye(3)[np.argmin(np.abs(z), axis=-1)]
-    x = helper - np.sum(helper * z, axis=-1, keepdims=True) * z
+    unit: Array = np.asarray(z, dtype=float)
+    unit = unit / np.linalg.norm(unit, axis=-1, keepdims=True)
+    helper = np.eye(3)[np.argmin(np.abs(unit), axis=-1)]
+    x: Array = helper - np.sum(helper * unit, axis=-1, keepdims=True) * unit
     x = x / np.linalg.norm(x, axis=-1, keepdims=True)
-    y = np.cross(z, x)
+    y = np.cross(unit, x)
     c, s = np.cos(roll)[..., None], np.sin(roll)[..., None]
-    return np.stack(np.broadcast_arrays(c * x + s * y, c * y - s * x, z), axis=-1)
+    return np.stack(np.broadcast_arrays(c * x + s * y, c * y - s * x, unit), axis=-1)

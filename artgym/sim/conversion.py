@@ -17,7 +17,8 @@ R_SIMCAM_CAMERA: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0
 
 def pose_from_transform(T_a_b: Array) -> sapien.Pose:
     """A simulator pose from ``T_a_b`` (4, 4)."""
-    return sapien.Pose(T_a_b[:3, 3], quaternion_from_matrix(T_a_b[:3, :3]))
+    position, quaternion = T_a_b[:3, 3], quaternion_from_matrix(T_a_b[:3, :3])
+    return sapien.Pose(position, quaternion)  # pyright: ignore[reportArgumentType]
 
 
 def poses_from_transforms(Ts_a_b: Array) -> list[sapien.Pose]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import typing
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -82,7 +83,7 @@ def hand_bodies() -> tuple[RayBody, RayBody, RayBody]:
 
 
 def _mesh_triangles(file: str) -> Array:
-    mesh = trimesh.load(panda_meshes() / file, force="mesh")
+    mesh = typing.cast(trimesh.Trimesh, trimesh.load(panda_meshes() / file, force="mesh"))
     return np.asarray(mesh.triangles)
 
 

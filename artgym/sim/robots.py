@@ -142,7 +142,7 @@ class FloatingHand:
                     shape.set_collision_groups([1, 1, 1 << 1, 0])
                     link.attach(shape)
             link.mass = _MASS[name]
-            link.inertia = _INERTIA[name]
+            link.inertia = _INERTIA[name]  # pyright: ignore[reportAttributeAccessIssue]
             link.cmass_local_pose = sapien.Pose([0, 0, 0.03])
             link.disable_gravity = True
             entity.add_component(link)
@@ -162,7 +162,7 @@ class FloatingHand:
                 control.finger_stiffness, control.finger_damping, control.finger_force
             )
             joint.set_drive_target(0.5 * width)
-        links[0].joint.type = "undefined"
+        links[0].joint.type = "undefined"  # pyright: ignore[reportAttributeAccessIssue]
         entities[0].pose = pose_from_transform(T_world_hand)
         for entity in entities:
             scene.add_entity(entity)
@@ -175,7 +175,7 @@ class FloatingHand:
         )
         self._articulation.qpos = np.full(2, 0.5 * width)
         self._drive = physx.PhysxDriveComponent(links[0])
-        self._drive.parent = None
+        self._drive.parent = None  # pyright: ignore[reportAttributeAccessIssue]
         for set_property in (
             self._drive.set_drive_property_x,
             self._drive.set_drive_property_y,

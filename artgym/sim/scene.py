@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, cast
 
 import numpy as np
 import sapien
@@ -162,7 +163,7 @@ class ManipulationScene:
         if render_system is not None:
             systems.append(render_system)
         self.sapien_scene = sapien.Scene(systems)
-        self._system = self.sapien_scene.physx_system
+        self._system = cast(physx.PhysxCpuSystem, self.sapien_scene.physx_system)
         self._system.timestep = config.timestep
         visuals = render_system is not None
         self._add_table(table_material if visuals else None)
@@ -176,7 +177,7 @@ class ManipulationScene:
             joint_creep=joint_creep,
         )
         self.hand: FloatingHand | None = None
-        self._hand_links: dict[physx.PhysxArticulationLinkComponent, int] = {}
+        self._hand_links: dict[physx.PhysxRigidBaseComponent, int] = {}
         if T_world_hand is not None:
             self.hand = FloatingHand(
                 self.sapien_scene, T_world_hand, width, visuals=visuals, control=config.hand
@@ -219,7 +220,8 @@ class ManipulationScene:
                 continue
             if finger is None:
                 continue
-            impulse = sum(point.impulse for point in contact.points)
+            points: list[Any] = contact.points
+            impulse = sum(point.impulse for point in points)
             if not np.any(impulse):
                 continue
             touched = True
@@ -265,7 +267,7 @@ def _attach_shapes(body: physx.PhysxArticulationLinkComponent, link: Link, group
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
     body.mass = link.mass
-    body.inertia = moments
+    body.inertia = moments  # pyright: ignore[reportAttributeAccessIssue]
     body.cmass_local_pose = pose_from_transform(transform_from(axes, link.center_of_mass))
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import colorsys
+from collections.abc import Iterable
+from typing import cast
 
 import numpy as np
 
-from artgym.objects.model import Box, Cylinder, Material, Shape
+from artgym.objects.model import Box, Cylinder, Material, Shape, Vector
 
 Interval = tuple[float, float]
 
 #: Rows of a rotation that lays a cylinder's axis (x) along the named axis.
-_CYLINDER_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
+_CYLINDER_AXES: dict[str, tuple[Vector, Vector, Vector]] = {
     "x": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     "y": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
     "z": ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
@@ -31,12 +33,12 @@ def box_between(low: tuple[float, ...], high: tuple[float, ...], material: Mater
 
 
 def cylinder_along(
-    axis: str, center: tuple[float, ...], radius: float, length: float, material: Material
+    axis: str, center: Iterable[float], radius: float, length: float, material: Material
 ) -> Shape:
     """A cylinder along "x", "y" or "z" of the link's frame, metres."""
     return Shape(
         geometry=Cylinder(radius=float(radius), half_length=float(length) / 2),
-        position=tuple(float(c) for c in center),
+        position=cast(Vector, tuple(float(c) for c in center)),
         rotation=_CYLINDER_AXES[axis],
         material=material,
     )
