@@ -15,9 +15,10 @@ import artgym  # noqa: F401  (registers the environments)
 from artgym.datasets.frame import CameraFrame
 from artgym.objects import catalog
 from artgym.objects.model import Material
-from artgym.sim.camera import RenderedCamera, ViewDistribution, add_lights
+from artgym.sim.camera import RenderedCamera, ViewDistribution
 from artgym.sim.renderer import render_system
 from artgym.sim.scene import ManipulationScene
+from artgym.sim.setting import add_lights
 from icaf4_policy.drawing import draw_prediction
 from icaf4_policy.inference import Perception
 from icaf4_policy.policy import shipped_weights

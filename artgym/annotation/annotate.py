@@ -26,6 +26,7 @@ from artgym.objects.meshes import link_triangles
 from artgym.objects.model import ArticulatedObject
 from artgym.sim import rays
 from artgym.sim.camera import ViewDistribution
+from artgym.sim.setting import MAX_YAW
 
 Array = NDArray[np.floating]
 
@@ -54,7 +55,7 @@ class AnnotationConfig:
     latest: float = 0.3
     points: int = 48
     views: int = 8
-    yaw: float = 0.35
+    yaw: float = MAX_YAW
     filter: FilterConfig = field(default_factory=FilterConfig)
     trial: TrialConfig = field(default_factory=TrialConfig)
     seed: int = 0

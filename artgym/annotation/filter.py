@@ -65,6 +65,8 @@ _BOX_R, _BOX_CENTER, _BOX_HALF = _open_hand_boxes()
 _HAND_RADIUS = float(
     max(np.linalg.norm(c) + np.linalg.norm(h) for c, h in zip(_BOX_CENTER, _BOX_HALF, strict=True))
 )
+#: Nor any farther from the plane of the fingers than this.
+_HAND_HALF_X = max(box.half_size[0] for box in HAND_BOXES)
 _PAD = HAND_BOXES[4]
 #: The pads' sweep in the grasp's frame: |x|, |y| and the interval of z.
 _SWEEP_X, _SWEEP_Y = _PAD.half_size[0], FINGER_TRAVEL
@@ -145,7 +147,7 @@ def _judge_point(  # type: ignore[no-untyped-def]
                     and z > _SWEEP_Z[0] - reach
                 ):
                     between = True
-                if abs(x) > 0.0316:
+                if abs(x) > _HAND_HALF_X:
                     continue
                 for b in range(boxes):
                     ux, uy, uz = x - box_center[b, 0], y - box_center[b, 1], z - box_center[b, 2]

@@ -27,14 +27,14 @@ from artgym.errors import InvalidArgumentError
 from artgym.files import Manifest
 from artgym.geometry import transforms
 from artgym.geometry.camera import points_from_depth
-from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.jobs import ShardTask, run_shards
 from artgym.objects import catalog
-from artgym.objects.model import ArticulatedObject, Material, canonical_box
+from artgym.objects.model import ArticulatedObject, canonical_box
 from artgym.sim import rays
-from artgym.sim.camera import RenderedCamera, View, ViewDistribution, add_lights
+from artgym.sim.camera import RenderedCamera, View, ViewDistribution
 from artgym.sim.renderer import render_system
 from artgym.sim.scene import ManipulationScene
+from artgym.sim.setting import add_lights, random_placement, random_table
 
 Array = NDArray[np.floating]
 
@@ -93,10 +93,7 @@ def _make_sample(
     joint = obj.joint_of(MOVABLE_PART)
     q[MOVABLE_PART - 1] = joint.position(float(labels.fractions[state]))
     for _ in range(20):
-        T_world_object = transforms.transform_from(
-            matrix_from_axis_angle([0.0, 0.0, rng.uniform(-0.35, 0.35)]),
-            [*rng.uniform(-0.05, 0.05, 2), 0.0],
-        )
+        T_world_object = random_placement(rng)
         view = ViewDistribution().sample(rng, *config.camera_size)
         rgb, depth = _picture(obj, T_world_object, q, view, rng)
         part_mask, normals_world = _part_mask(obj, T_world_object, q, view, depth)
@@ -174,9 +171,9 @@ def _picture(
     rng: np.random.Generator,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """RGB and depth of the object alone on a table, randomly lit."""
-    look = Material(color=tuple(rng.uniform(0.2, 0.8, 3).tolist()), roughness=0.8)
+    table = random_table(rng)
     scene = ManipulationScene(
-        obj, T_world_object, q, render_system=render_system(), table_material=look
+        obj, T_world_object, q, render_system=render_system(), table_material=table
     )
     add_lights(scene.sapien_scene, rng)
     picture = RenderedCamera(scene.sapien_scene, view).take()

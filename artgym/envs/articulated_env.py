@@ -18,13 +18,14 @@ from artgym.errors import InvalidArgumentError, NotReadyError, UnknownNameError
 from artgym.geometry import transforms
 from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
 from artgym.objects import catalog
-from artgym.objects.model import ArticulatedObject, Material
+from artgym.objects.model import ArticulatedObject
 from artgym.sim import rays
-from artgym.sim.camera import RenderedCamera, View, ViewDistribution, add_lights
+from artgym.sim.camera import RenderedCamera, View, ViewDistribution
 from artgym.sim.conversion import pose_from_transform
 from artgym.sim.renderer import own_render_system
 from artgym.sim.robots import T_hand_tcp
 from artgym.sim.scene import ManipulationScene, PartContact, PhysicsConfig
+from artgym.sim.setting import add_lights, random_placement, random_table
 from artgym.tasks import rewards
 from artgym.tasks.rewards import RewardMode
 from artgym.tasks.success import (
@@ -208,11 +209,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._object = catalog.load(object_id or drawn_id)
         category = catalog.category(self._object.category)
         drawn_fraction = float(rng.uniform(*category.start_fraction))
-        yaw = rng.uniform(-0.35, 0.35)
-        position = np.array([*rng.uniform(-0.05, 0.05, 2), 0.0])
-        self._T_world_object = transforms.transform_from(
-            matrix_from_axis_angle([0.0, 0.0, yaw]), position
-        )
+        self._T_world_object = random_placement(rng)
         self._joint = self._object.joint_of(self.target_part)
         q = self._object.rest_positions.copy()
         q[self.target_part - 1] = self._joint.position(
@@ -223,7 +220,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             rng.uniform([0.05, -0.2, 0.62], [0.25, 0.2, 0.72]),
         )
         self._view = ViewDistribution().sample(rng, *self.camera_size)
-        look = Material(color=tuple(rng.uniform(0.2, 0.8, 3).tolist()), roughness=0.8)
+        table = random_table(rng)
         light_seed = int(rng.integers(2**31))
         self._cloud_rng = np.random.default_rng(int(rng.integers(2**31)))
 
@@ -236,7 +233,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             width=0.5 * MAX_WIDTH,
             config=PhysicsConfig(),
             render_system=self._render_system,
-            table_material=look,
+            table_material=table,
         )
         if self._needs_renderer:
             add_lights(self._scene.sapien_scene, np.random.default_rng(light_seed))

@@ -15,6 +15,7 @@ from artgym.envs.articulated_env import ArtOpenEnv
 from artgym.geometry import transforms
 from artgym.geometry.grasps import T_GRASP_TCP, candidate_rotations
 from artgym.geometry.rotations import matrix_from_axis_angle
+from artgym.sim.setting import MAX_YAW
 
 Array = NDArray[np.floating]
 
@@ -71,7 +72,7 @@ class ScriptedExpert:
         obj, part, q = env.object, env.target_part, env.joint_positions()
         working: list[Array] = []
         for _ in range(3):
-            points, normals = visible_points(obj, q, part, self._points, 4, 0.35, self._rng)
+            points, normals = visible_points(obj, q, part, self._points, 4, MAX_YAW, self._rng)
             R_grasps = candidate_rotations(normals)
             possible = np.argwhere(judge(obj, q, part, points, R_grasps) == Verdict.POSSIBLE)
             for i, c in self._rng.permutation(possible)[: self._trials]:

@@ -111,16 +111,3 @@ class RenderedCamera:
         depth = position_mm[..., 2].astype(np.float32) * np.float32(-1e-3)
         depth[(depth < NEAR) | (depth > FAR)] = 0.0
         return rgb, depth
-
-
-def add_lights(scene: sapien.Scene, rng: np.random.Generator) -> None:
-    """Ambient light and one or two lamps from random directions above."""
-    ambient = rng.uniform(0.25, 0.5)
-    scene.set_ambient_light([ambient] * 3)
-    for _ in range(int(rng.integers(1, 3))):
-        azimuth, height = rng.uniform(-np.pi, np.pi), rng.uniform(0.6, 1.5)
-        strength = rng.uniform(0.6, 1.6)
-        warmth = rng.uniform(0.85, 1.0)
-        scene.add_directional_light(
-            [np.cos(azimuth), np.sin(azimuth), -height], [strength, strength, strength * warmth]
-        )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from artgym.geometry import transforms
 from artgym.geometry.camera import pixel_rays
+from artgym.geometry.rotations import JAW_SYMMETRY
 from artgym.objects.meshes import link_triangles
 from artgym.objects.model import Link
 from artgym.sim.robots import FINGER_ORIGIN, panda_meshes
@@ -78,8 +79,7 @@ def hand_bodies() -> tuple[RayBody, RayBody, RayBody]:
     """Ray bodies of the Panda's hand, left and right finger, each in its link's frame."""
     hand = _mesh_triangles("hand.glb")
     finger = _mesh_triangles("finger.glb")
-    half_turn = np.diag([-1.0, -1.0, 1.0])
-    return RayBody(hand), RayBody(finger), RayBody(finger @ half_turn)
+    return RayBody(hand), RayBody(finger), RayBody(finger @ JAW_SYMMETRY)
 
 
 def _mesh_triangles(file: str) -> Array:

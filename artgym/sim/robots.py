@@ -128,7 +128,6 @@ class FloatingHand:
         visuals: bool,
         control: HandControl,
     ) -> None:
-        self._control = control
         pads = physx.PhysxMaterial(_PAD_FRICTION, _PAD_FRICTION, 0.0)
         entities = [sapien.Entity() for _ in range(3)]
         links: list[physx.PhysxArticulationLinkComponent] = []

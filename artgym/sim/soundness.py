@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,15 +141,7 @@ def check(obj: ArticulatedObject, judge: GraspJudge) -> Soundness:
         note = "not measured: " + ("no mass" if movable.passed else "nothing moves")
         verdicts += [
             Verdict(rule=rule, value=math.nan, relation="<=", bar=0.0, note=note)
-            for rule in (
-                "collision shape",
-                "penetration",
-                "no drift",
-                "opens",
-                "no jam",
-                "stays put",
-                "graspable",
-            )
+            for rule in get_args(Rule)[len(verdicts) :]
         ]
     return Soundness(object_id=obj.object_id, verdicts=tuple(verdicts))
 

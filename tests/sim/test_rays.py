@@ -11,8 +11,9 @@ from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.objects import catalog
 from artgym.objects.model import Material
 from artgym.sim import rays
-from artgym.sim.camera import RenderedCamera, View, ViewDistribution, add_lights
+from artgym.sim.camera import RenderedCamera, View, ViewDistribution
 from artgym.sim.scene import TABLE_HALF_SIZE, ManipulationScene
+from artgym.sim.setting import add_lights
 
 IDS = ["drawer/0001", "drawer/0007", "laptop/0001", "laptop/0002"]
 ABOVE = transforms.transform_from(np.diag([1.0, -1.0, -1.0]), [0.15, 0.1, 0.55])
