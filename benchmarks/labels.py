@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
@@ -26,14 +24,13 @@ from artgym.annotation.annotate import (
     read_labels,
 )
 from artgym.annotation.filter import Verdict
-from artgym.errors import ArtgymError, InvalidArgumentError
+from artgym.errors import InvalidArgumentError
 from artgym.geometry.grasps import APPROACH_RINGS, NUM_CANDIDATES, NUM_ROLLS, candidates_of_part
 from artgym.objects import catalog
 from benchmarks import record
+from benchmarks.command import run
 from icaf4_policy.metrics import CHANCE_ROWS, grasp_distances
 
-#: Width of the printed tables where they are not shown on a terminal.
-_WIDTH = 120
 #: Grasps that each chance row draws at a point: all rolls of the grid, or as many at random.
 _DRAWS = NUM_ROLLS
 
@@ -205,27 +202,16 @@ def statistics_table(labels: dict[str, dict[str, Any]]) -> Table:
     return table
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the benchmark, prints its table, writes its result.
+def report(config: LabelsConfig) -> list[Table]:
+    """Measures, writes ``labels.json`` and gives the table."""
+    result = measure(config)
+    record.write_result(config.out / "labels.json", result)
+    return [statistics_table(result["labels"])]
 
-    Returns:
-        The exit status: 0 success, 1 failure, 130 interrupted. A command line that cannot be
-        understood ends the process with 2.
-    """
-    try:
-        config = tyro.cli(LabelsConfig, prog="benchmarks.labels", args=arguments)
-        result = measure(config)
-        path = config.out / "labels.json"
-        record.write_result(path, result)
-    except ArtgymError as error:
-        print(f"labels: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("labels: interrupted.", file=sys.stderr)
-        return 130
-    Console(width=None if sys.stdout.isatty() else _WIDTH).print(statistics_table(result["labels"]))
-    print(f"wrote {path}")
-    return 0
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the benchmark; see ``benchmarks.command.run``."""
+    return run("labels", LabelsConfig, report, arguments)
 
 
 if __name__ == "__main__":

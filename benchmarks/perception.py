@@ -12,23 +12,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-from rich.console import Console
 from rich.table import Table
 
 from artgym.annotation.annotate import labelled_ids
-from artgym.errors import ArtgymError, InvalidArgumentError
+from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
+from benchmarks.command import run
 from benchmarks.paper import TABLE_1
 from benchmarks.parallel import results_in_order
 from benchmarks.policies import load_perception
 from benchmarks.views import ViewsTask, score_views
 from icaf4_policy.metrics import CHANCE_ROWS, COVERAGE_DEG, PRECISION_DEG, mean_rows
-
-#: Width of the printed tables where they are not shown on a terminal.
-_WIDTH = 150
 
 #: Rows of the first table: metric, what is printed, decimals.
 _PRINTED = (
@@ -201,30 +197,17 @@ def _cell(value: float | None, decimals: int) -> str:
     return "-" if value is None or value != value else f"{value:.{decimals}f}"
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the benchmark, prints its tables, writes its result.
+def report(config: PerceptionConfig) -> list[Table]:
+    """Measures, writes ``perception.json`` and gives the tables."""
+    result = measure(config)
+    record.write_result(config.out / "perception.json", result)
+    metrics = result["metrics"]
+    return [metrics_table(metrics), *(grasp_table(name, metrics[name]) for name in metrics)]
 
-    Returns:
-        The exit status: 0 success, 1 failure, 130 interrupted. A command line that cannot be
-        understood ends the process with 2.
-    """
-    try:
-        config = tyro.cli(PerceptionConfig, prog="benchmarks.perception", args=arguments)
-        result = measure(config)
-        path = config.out / "perception.json"
-        record.write_result(path, result)
-    except ArtgymError as error:
-        print(f"perception: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("perception: interrupted.", file=sys.stderr)
-        return 130
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
-    console.print(metrics_table(result["metrics"]))
-    for category, values in result["metrics"].items():
-        console.print(grasp_table(category, values))
-    print(f"wrote {path}")
-    return 0
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the benchmark; see ``benchmarks.command.run``."""
+    return run("perception", PerceptionConfig, report, arguments)
 
 
 if __name__ == "__main__":

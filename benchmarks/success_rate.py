@@ -12,22 +12,18 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-from rich.console import Console
 from rich.table import Table
 
-from artgym.errors import ArtgymError, InvalidArgumentError
+from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
+from benchmarks.command import run
 from benchmarks.episodes import EpisodeRecord, EpisodeTask, episode_tasks, outcomes, run_in_worker
 from benchmarks.parallel import results_in_order
 from benchmarks.pictures import PicturesTask, require_film_writer, take_pictures
 from benchmarks.policies import POLICIES, load_perception, policy_entry
 from benchmarks.rates import aggregate
-
-#: Columns of the printed table where it is not shown on a terminal.
-_WIDTH = 180
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,32 +202,19 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f}" if share == share else "-"
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the benchmark, prints its tables, writes its result.
+def report(config: SuccessRateConfig) -> list[Table]:
+    """Measures, writes ``success_rate.json``, takes the pictures and gives the tables."""
+    result = measure(config)
+    # First what took long: pictures can be made again.
+    record.write_result(config.out / "success_rate.json", result)
+    if takes_pictures(config):
+        show(config, [EpisodeTask(**task) for task in result["shown"]])
+    return [table_from_rows(category, rows) for category, rows in result["rows"].items()]
 
-    Returns:
-        The exit status: 0 success, 1 failure, 130 interrupted. A command line that cannot be
-        understood ends the process with 2.
-    """
-    try:
-        config = tyro.cli(SuccessRateConfig, prog="benchmarks.success_rate", args=arguments)
-        result = measure(config)
-        path = config.out / "success_rate.json"
-        # First what took long: pictures can be made again.
-        record.write_result(path, result)
-        if takes_pictures(config):
-            show(config, [EpisodeTask(**task) for task in result["shown"]])
-    except ArtgymError as error:
-        print(f"success_rate: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("success_rate: interrupted.", file=sys.stderr)
-        return 130
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
-    for category, rows in result["rows"].items():
-        console.print(table_from_rows(category, rows))
-    print(f"wrote {path}")
-    return 0
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the benchmark; see ``benchmarks.command.run``."""
+    return run("success_rate", SuccessRateConfig, report, arguments)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,63 @@
+"""What every benchmark's command line does the same: read options, report, end with a status."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from artgym.errors import ArtgymError
+
+#: Columns of printed tables where they are not shown on a terminal.
+_WIDTH = 180
+
+
+class Options(Protocol):
+    """Options of any benchmark."""
+
+    @property
+    def out(self) -> Path:
+        """Folder for ``NAME.json``."""
+        ...
+
+
+C = TypeVar("C", bound=Options)
+
+
+def run(
+    name: str,
+    config_type: type[C],
+    report: Callable[[C], Iterable[Table]],
+    arguments: Sequence[str] | None,
+) -> int:
+    """Runs ``python -m benchmarks.NAME`` and prints its tables.
+
+    Args:
+        name: of the benchmark's module.
+        config_type: dataclass whose fields are the options.
+        report: measures, writes ``NAME.json`` to ``out``, and gives the tables.
+        arguments: what follows on the command line; by default the process's own.
+
+    Returns:
+        The exit status: 0 success, 1 failure, 130 interrupted. A command line that cannot be
+        understood ends the process with 2.
+    """
+    try:
+        config = tyro.cli(config_type, prog=f"benchmarks.{name}", args=arguments)
+        tables = report(config)
+    except ArtgymError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted.", file=sys.stderr)
+        return 130
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
+    for table in tables:
+        console.print(table)
+    print(f"wrote {config.out / f'{name}.json'}")
+    return 0
