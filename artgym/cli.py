@@ -5,11 +5,20 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
 import artgym
-from artgym.errors import ArtgymError, InvalidArgumentError, UnknownNameError
+from artgym.errors import (
+    ArtgymError,
+    InvalidArgumentError,
+    RendererUnavailableError,
+    UnknownNameError,
+)
+
+if TYPE_CHECKING:
+    from artgym.objects.model import ArticulatedObject
 
 
 # Functions import what they need themselves: `artgym doctor` must answer on a machine where the
@@ -31,7 +40,7 @@ def objects(*, category: str | None = None, split: str = "train", count: int | N
     """List the objects of the catalogue, one a line.
 
     Args:
-        category: only this one; by default all.
+        category: only this one, or import for what was imported here; by default all categories.
         split: train, val or test.
         count: the first so many of each category; by default all.
     """
@@ -50,6 +59,82 @@ def objects(*, category: str | None = None, split: str = "train", count: int | N
     return 0
 
 
+def import_(
+    path: tyro.conf.Positional[Path],
+    *,
+    name: str | None = None,
+    category: str | None = None,
+    scale: float | Literal["auto"] | None = None,
+    front: Literal["+x", "-x", "+y", "-y"] | None = None,
+    closed: tuple[str, ...] = (),
+    solid: Literal["collision", "visual"] | None = None,
+    density: float | None = None,
+    picture: Path | None = None,
+) -> int:
+    """Bring an object of your own: check it, and keep it under an id that works everywhere.
+
+    Args:
+        path: a URDF or MJCF file, a PartNet-Mobility folder, or a folder that holds one of them.
+        name: a-z, 0-9, "_" and "-": the object becomes import/NAME; by default the file's name.
+            An imported object of that name is replaced.
+        category: a category, or other; by default guessed from names.
+        scale: factor for all lengths, or auto: one that gives a size of the category.
+        front: the axis of the file that its front faces; by default the side its parts are on.
+        closed: closed ends of joints: hinge=upper, slide=lower, or a position: lid=0.1.
+        solid: what collides, the file's collision geometry or what is seen; by default collision
+            geometry, unless what is seen of a movable part lies elsewhere.
+        density: kg/m^3 in place of the file's masses.
+        picture: folder for a picture of the object, should it not be sound.
+    """
+    from artgym.annotation.filter import judge
+    from artgym.objects import store
+    from artgym.objects.importing import import_object
+    from artgym.sim import soundness
+
+    if name is not None:
+        store.object_id(name)
+    imported = import_object(
+        path,
+        name=name,
+        category=category,
+        scale=scale,
+        front=front,
+        closed=_closed_ends(closed),
+        solid=solid,
+        density=density,
+    )
+    obj = imported.object
+    for note in imported.notes:
+        print(f"note  {note}")
+    found = soundness.check(obj, judge)
+    for verdict in found.verdicts:
+        print(verdict)
+    if not found.passed and picture is not None:
+        _take_picture(obj, picture)
+    object_id = store.save(obj, name or obj.object_id)
+    parts = ", ".join(f"{i} {part}" for i, part in enumerate(obj.part_names) if i)
+    print(f"{object_id}  {obj.category}, parts {parts}; {store.folder()}")
+    if not found.passed:
+        print(f"{object_id} is not sound: see what fails above before you train on it.")
+    return 0
+
+
+def _closed_ends(pairs: Sequence[str]) -> dict[str, Any] | None:
+    """Closed ends of joints as a reader wants them, from texts such as "hinge=upper"."""
+    ends: dict[str, Any] = {}
+    for pair in pairs:
+        joint, equals, end = pair.rpartition("=")
+        if not (joint and equals):
+            raise InvalidArgumentError(
+                f"--closed {pair!r}: expected JOINT=lower, JOINT=upper or JOINT=POSITION"
+            )
+        try:
+            ends[joint] = float(end)
+        except ValueError:
+            ends[joint] = end
+    return ends or None
+
+
 def check(
     ids: tyro.conf.Positional[tuple[str, ...]] = (),
     *,
@@ -57,15 +142,18 @@ def check(
     category: str | None = None,
     split: str = "train",
     count: int | None = None,
+    picture: Path | None = None,
 ) -> int:
     """Say whether objects are fit to simulate: one verdict a rule, and why.
 
     Args:
-        ids: objects to check, such as drawer/0012.
+        ids: objects to check, such as drawer/0012 or import/NAME; or paths that `artgym import`
+            takes, which are read and not kept.
         all: check whole categories instead; only broken rules are printed.
-        category: with --all, only this one.
+        category: with --all, only this one; import for what was imported here.
         split: with --all, train, val or test.
         count: with --all, the first so many of each category.
+        picture: folder for a picture of each object that breaks a rule; none by default.
     """
     from tqdm import tqdm
 
@@ -80,20 +168,63 @@ def check(
     chosen = _catalogue_ids(category, split, count) if all else ids
     for object_id in ids:
         # A wrong id is said before any work is done.
-        catalog.load(object_id)
+        if not _is_path(object_id):
+            catalog.load(object_id)
     failed = 0
     for object_id in tqdm(chosen, desc="check", unit="object", disable=not all):
-        found = soundness.check(catalog.load(object_id), judge)
+        obj = _object_of(object_id)
+        found = soundness.check(obj, judge)
         failed += not found.passed
         for verdict in found.failures if all else found.verdicts:
             tqdm.write(f"{object_id}  {verdict}", file=sys.stdout)
+        if picture is not None and not found.passed:
+            _take_picture(obj, picture)
     print(f"{len(chosen) - failed} of {len(chosen)} objects are sound.")
     return 1 if failed else 0
 
 
+def _is_path(source: str) -> bool:
+    """Whether a word on the command line is a path rather than an id."""
+    from artgym.objects import catalog, store
+
+    is_id = store.is_imported(source) or source.partition("/")[0] in catalog.CATEGORIES
+    return not is_id and Path(source).exists()
+
+
+def _object_of(source: str) -> ArticulatedObject:
+    """The object of an id, or of a path that can be imported."""
+    from artgym.objects import catalog
+    from artgym.objects.importing import import_object
+
+    if not _is_path(source):
+        return catalog.load(source)
+    imported = import_object(source)
+    for note in imported.notes:
+        print(f"{source}  note  {note}")
+    return imported.object
+
+
+def _take_picture(obj: ArticulatedObject, folder: Path) -> None:
+    """Writes a picture of an object, or says why there is none."""
+    import imageio.v3 as imageio
+
+    from artgym.files import write_file_whole
+    from artgym.sim.thumbnail import thumbnail
+
+    path = folder / f"{obj.object_id.replace('/', '_')}.png"
+    try:
+        pixels = thumbnail(obj, size=(480, 360))
+    except RendererUnavailableError as error:
+        print(f"no picture of {obj.object_id}: {error}")
+        return
+    write_file_whole(path, imageio.imwrite("<bytes>", pixels, extension=".png"))
+    print(f"{obj.object_id}  pictured in {path}")
+
+
 def annotate(
     *,
-    category: str,
+    category: str | None = None,
+    object: str | None = None,
     split: str = "train",
     count: int = 40,
     out: Path | None = None,
@@ -103,15 +234,31 @@ def annotate(
 
     Args:
         category: the category to label.
+        object: label this one object instead, import/NAME for instance.
         split: train, val or test.
         count: the first so many objects of the split.
-        out: folder that gets {category}/{split}; by default the labels inside the package.
+        out: folder that gets {category}/{split}; by default the labels inside the package. With
+            --object it must be given.
         workers: processes; any number gives the same bytes.
     """
-    from artgym.annotation.annotate import annotate_split, labels_folder
+    from artgym.annotation import annotate as labels
+    from artgym.files import write_arrays
+    from artgym.objects import catalog
 
-    manifest = annotate_split(category, split, count, root=out, workers=workers)  # type: ignore[arg-type]
-    print(f"{len(manifest.shards)} label files in {labels_folder(category, split, out)}")
+    if (category is None) == (object is None):
+        raise InvalidArgumentError("give either --category or --object.")
+    if object is not None:
+        if out is None:
+            raise InvalidArgumentError("--object wants --out, the folder for its labels.")
+        catalog.load(object)
+        folder = labels.labels_folder(object.partition("/")[0], catalog.split_of(object), out)
+        path = folder / labels.label_file_name(object)
+        write_arrays(path, labels.annotate(object))
+        print(path)
+        return 0
+    assert category is not None
+    manifest = labels.annotate_split(category, split, count, root=out, workers=workers)  # type: ignore[arg-type]
+    print(f"{len(manifest.shards)} label files in {labels.labels_folder(category, split, out)}")
     return 0
 
 
@@ -155,19 +302,46 @@ def generate(
     return 0
 
 
-def _catalogue_ids(category: str | None, split: str, count: int | None) -> list[str]:
-    from artgym.objects import catalog
+def export(
+    source: tyro.conf.Positional[str],
+    *,
+    out: Path,
+    format: Literal["urdf", "mjcf"] = "urdf",
+) -> int:
+    """Write an object as other simulators read it.
 
-    names = list(catalog.CATEGORIES) if category is None else [category]
+    Args:
+        source: an id, such as drawer/0012, or a file or folder that `artgym import` takes.
+        out: folder for the file and its meshes.
+        format: urdf, with the object's exact description beside it, or mjcf for MuJoCo.
+    """
+    from artgym.objects import catalog
+    from artgym.objects.importing import import_object
+    from artgym.objects.mjcf_export import write_mjcf
+    from artgym.objects.urdf_export import write_urdf
+
+    obj = import_object(source).object if Path(source).exists() else catalog.load(source)
+    print((write_urdf if format == "urdf" else write_mjcf)(obj, out))
+    return 0
+
+
+def _catalogue_ids(category: str | None, split: str, count: int | None) -> list[str]:
+    from artgym.objects import catalog, store
+
+    if category == store.PREFIX:
+        return list(store.ids()[:count])
+    names = catalog.categories_with(split) if category is None else [category]
     return [i for name in names for i in catalog.object_ids(name, split, count)]  # type: ignore[arg-type]
 
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "doctor": doctor,
     "objects": objects,
+    "import": import_,
     "check": check,
     "annotate": annotate,
     "generate": generate,
+    "export": export,
 }
 
 

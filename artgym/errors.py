@@ -9,6 +9,10 @@ import difflib
 from collections.abc import Iterable
 
 
+def _cut(text: str, length: int = 120) -> str:
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
 class ArtgymError(Exception):
     """Base of all errors raised on purpose by this package."""
 
@@ -46,6 +50,38 @@ class RendererUnavailableError(ArtgymError, RuntimeError):
 
 class DamagedFileError(ArtgymError):
     """A file of ours cannot be read as what it should be; the message names it."""
+
+
+class AssetError(ArtgymError, ValueError):
+    """A file that describes an object cannot be used.
+
+    Args:
+        file: the file, as the caller knows it.
+        problem: what is wrong, in a few words.
+        remedy: what to do about it.
+        element: the place in the file: "joint 'hinge' axis", "face 17".
+        value: what stands there; long values are cut.
+    """
+
+    def __init__(
+        self,
+        file: object,
+        problem: str,
+        *,
+        remedy: str,
+        element: str = "",
+        value: object = None,
+    ) -> None:
+        shown = "" if value is None else f" (got {_cut(repr(value))})"
+        place = f"{element}: " if element else ""
+        super().__init__(f"{file}: {place}{problem}{shown}. {remedy}")
+        self.file = str(file)
+        self.element = element
+        self.value = value
+        self.remedy = remedy
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (InvalidArgumentError, (str(self),))
 
 
 class FileNotWrittenError(ArtgymError, OSError):

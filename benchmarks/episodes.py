@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 import artgym  # noqa: F401  registers the environments
 from artgym.objects import catalog
 from benchmarks.policies import policy_entry
+
+#: Which movable part an episode is about: the object's first, or all of them in turn.
+PartChoice = Literal["first", "in turn"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +28,7 @@ class EpisodeTask:
         policy: name of a policy, or "module:Class".
         category: and ``split``: where the object is from.
         object_id: the object.
+        part: index of the part to move.
         episode: number among those of this object.
         seed: of the environment.
         policy_seed: of the policy; another, lest its draws repeat the environment's.
@@ -35,6 +39,7 @@ class EpisodeTask:
     category: str
     split: catalog.Split
     object_id: str
+    part: int
     episode: int
     seed: int
     policy_seed: int
@@ -46,7 +51,7 @@ class EpisodeRecord:
     """What is kept of an episode: its end, by the fields of the environment's ``info``.
 
     Attributes:
-        policy, category, object_id, episode, seed: as of the task.
+        policy, category, object_id, part, episode, seed: as of the task.
         success, success_gripped, success_once, success_at, success_maniskill,
             success_where2act: at the last step.
         travel, engaged, gripped, open_fraction: at the last step, shares.
@@ -58,6 +63,7 @@ class EpisodeRecord:
     policy: str
     category: str
     object_id: str
+    part: int
     episode: int
     seed: int
     success: bool
@@ -96,10 +102,12 @@ def episode_tasks(
     *,
     seed: int,
     weights: Path | None,
+    parts: PartChoice = "first",
 ) -> list[EpisodeTask]:
-    """The episodes of a row: every policy is given the same objects and starts."""
+    """The episodes of a row: every policy is given the same objects, parts and starts."""
     tasks = []
     for index, object_id in enumerate(catalog.object_ids(category, split, objects)):
+        movable = catalog.load(object_id).num_parts - 1
         for episode in range(episodes):
             seeds = np.random.SeedSequence([seed, index, episode]).generate_state(2)
             tasks.append(
@@ -108,6 +116,7 @@ def episode_tasks(
                     category=category,
                     split=split,
                     object_id=object_id,
+                    part=1 + (index + episode) % movable if parts == "in turn" else 1,
                     episode=episode,
                     # Below 2**31, which every consumer of a seed accepts.
                     seed=int(seeds[0] >> 1),
@@ -136,15 +145,15 @@ def run_episode(
     began = time.perf_counter()
     env = gymnasium.make(
         "ArtOpen-v0",
-        categories=(task.category,),
-        split=task.split,
+        objects=(task.object_id,),
+        target_part=task.part,
         obs_mode=entry.obs_mode,
         render_mode=render_mode,
         disable_env_checker=True,
     )
     try:
         policy = entry.make(env, task.category, task.weights)
-        observation, info = env.reset(seed=task.seed, options={"object_id": task.object_id})
+        observation, info = env.reset(seed=task.seed)
         policy.reset(task.policy_seed)
         steps, over = 0, False
         while not over:
@@ -160,6 +169,7 @@ def run_episode(
         policy=task.policy,
         category=task.category,
         object_id=task.object_id,
+        part=task.part,
         episode=task.episode,
         seed=task.seed,
         steps=steps,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from artgym.annotation.annotate import (
     MOVABLE_PART,
     TRIAL_ENDS,
     Labels,
+    labelled_categories,
     labelled_ids,
     read_labels,
 )
@@ -40,14 +41,14 @@ class LabelsConfig:
     """What do the grasp labels hold, and what does chance score on them?
 
     Attributes:
-        category: categories of objects.
+        category: categories of objects; by default those with shipped labels.
         split: splits; those without labels are left out.
         labels: folder with {category}/{split}, instead of the shipped labels.
         seed: of the chance rows.
         out: folder for labels.json.
     """
 
-    category: tuple[str, ...] = tuple(catalog.CATEGORIES)
+    category: tuple[str, ...] = field(default_factory=labelled_categories)
     split: tuple[catalog.Split, ...] = ("train", "val", "test")
     labels: Path | None = None
     seed: int = 0
@@ -143,8 +144,7 @@ def _chance(labels: Sequence[Labels], rng: np.random.Generator) -> dict[str, dic
     for one in labels:
         obj = catalog.load(one.object_id)
         for state, fraction in enumerate(one.fractions):
-            q = obj.rest_positions.copy()
-            q[MOVABLE_PART - 1] = obj.joint_of(MOVABLE_PART).position(float(fraction))
+            q = obj.positions_with(MOVABLE_PART, float(fraction))
             R_object_part = obj.link_poses(q)[MOVABLE_PART][:3, :3]
             tries = one.success[state]
             graspable = np.flatnonzero(tries.any(axis=1))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from benchmarks import record
 from benchmarks.command import run
 from benchmarks.paper import TABLE_1
 from benchmarks.parallel import results_in_order
-from benchmarks.policies import load_perception
+from benchmarks.policies import load_perception, trained_categories
 from benchmarks.views import ViewsTask, score_views
 from icaf4_policy.metrics import CHANCE_ROWS, COVERAGE_DEG, PRECISION_DEG, mean_rows
 
@@ -56,7 +56,7 @@ class PerceptionConfig:
     """How well does the network see objects that it has never seen?
 
     Attributes:
-        category: categories of objects.
+        category: categories of objects; by default those with shipped weights.
         split: whose labelled objects are looked at.
         objects: how many at most, the first that have labels; None for all.
         views: pictures of each labelled joint state.
@@ -67,7 +67,7 @@ class PerceptionConfig:
         out: folder for perception.json.
     """
 
-    category: tuple[str, ...] = tuple(catalog.CATEGORIES)
+    category: tuple[str, ...] = field(default_factory=trained_categories)
     split: catalog.Split = "test"
     objects: int | None = None
     views: int = 4

@@ -6,6 +6,7 @@ import functools
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any, Protocol, cast, get_args
 
@@ -105,6 +106,12 @@ POLICIES: dict[str, PolicyEntry] = {
     "icaf4": PolicyEntry(obs_mode="rgbd", make=_icaf4, perceives=True),
     "expert": PolicyEntry(obs_mode="state", make=_expert),
 }
+
+
+def trained_categories() -> tuple[str, ...]:
+    """The categories that weights are shipped for."""
+    folder = Path(str(resources.files("icaf4_policy"))) / "weights"
+    return tuple(sorted(path.stem for path in folder.glob("*.safetensors")))
 
 
 def weights_path(category: str, weights: Path | None) -> Path:

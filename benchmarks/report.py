@@ -18,7 +18,11 @@ from benchmarks.record import RESULTS_FOLDER
 ROOT = Path(__file__).parent.parent
 
 #: Pages with blocks to fill.
-PAGES = (ROOT / "README.md", ROOT / "icaf4_policy" / "weights" / "README.md")
+PAGES = (
+    ROOT / "README.md",
+    ROOT / "docs" / "objects.md",
+    ROOT / "icaf4_policy" / "weights" / "README.md",
+)
 
 
 def success_rate_block(result: Mapping[str, Any]) -> str:
@@ -89,9 +93,62 @@ def perception_block(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def objects_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``objects.json``, a category a line."""
+    lines = [
+        "| category | sound | opened by the expert | gripped | zero action | id to scene, ms |",
+        "|---|---|---|---|---|---|",
+    ]
+    for category, row in result["rows"].items():
+        low, high = row["expert"]["success_interval"]
+        lines.append(
+            f"| {category} | {row['sound']} of {row['checked']} "
+            f"| {100 * row['expert']['success']:.0f} % ({100 * low:.0f}-{100 * high:.0f}) "
+            f"| {100 * row['expert']['success_gripped']:.0f} % "
+            f"| {100 * row['zero']['success']:.0f} % "
+            f"| {row['build_ms']['median']:.1f} |"
+        )
+    config = result["config"]
+    lines += [
+        "",
+        f"{config['sound']} objects a category checked; {config['opened']} test objects opened, "
+        "one episode each, their movable parts in turn; Wilson 95 % intervals in brackets.",
+    ]
+    return "\n".join(lines)
+
+
+def variety_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``variety.json``, a category a line."""
+    lines = [
+        "| category | depth x width x height, m | joint range, deg or m | forms | grips "
+        "| near-duplicates | real ones within |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for category, row in result["rows"].items():
+        extents = " x ".join(f"{low:.2f}-{high:.2f}" for low, _, high in row["extents_m"].values())
+        low = min(low for low, _, _ in row["joint_range"].values())
+        high = max(high for _, _, high in row["joint_range"].values())
+        real = f"{row['real'] - len(row['real_outside'])} of {row['real']}" if row["real"] else ""
+        lines.append(
+            f"| {category} | {extents} | {low:.3g}-{high:.3g} | {', '.join(row['family'])} "
+            f"| {', '.join(row['handle'])} | {100 * row['near_duplicates']:.0f} % | {real} |"
+        )
+    lines += [
+        "",
+        f"{result['config']['objects']} objects a category, without their stands. A near-duplicate "
+        "has another object whose surface, half open, lies within "
+        f"{result['near_duplicate_below_percent']:g} % of the diagonal for 95 % of its points. "
+        "Real ones are the measured boxes, cutters, drawers, scissors and staplers of "
+        "`benchmarks/real_sizes.csv`: every extent of every part within the range made here.",
+    ]
+    return "\n".join(lines)
+
+
 BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "success_rate": success_rate_block,
     "perception": perception_block,
+    "objects": objects_block,
+    "variety": variety_block,
 }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from benchmarks.command import run
 from benchmarks.episodes import EpisodeRecord, EpisodeTask, episode_tasks, outcomes, run_in_worker
 from benchmarks.parallel import results_in_order
 from benchmarks.pictures import PicturesTask, require_film_writer, take_pictures
-from benchmarks.policies import POLICIES, load_perception, policy_entry
+from benchmarks.policies import POLICIES, load_perception, policy_entry, trained_categories
 from benchmarks.rates import aggregate
 
 
@@ -33,7 +33,7 @@ class SuccessRateConfig:
     Attributes:
         policy: rows of the table: zero, random, surface_normal, icaf4, expert, or module:Class
             for one of your own with the methods reset(seed) and act(observation).
-        category: categories of objects, a table each.
+        category: categories of objects, a table each; by default those with shipped weights.
         split: of the objects; choose parameters on "val", never on "test".
         objects: how many, the first of the split.
         episodes: an object.
@@ -45,7 +45,7 @@ class SuccessRateConfig:
     """
 
     policy: tuple[str, ...] = tuple(POLICIES)
-    category: tuple[str, ...] = tuple(catalog.CATEGORIES)
+    category: tuple[str, ...] = field(default_factory=trained_categories)
     split: catalog.Split = "test"
     objects: int = 40
     episodes: int = 1

@@ -5,6 +5,7 @@ Needs a renderer. Objects are test objects; the same command gives the same pict
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -40,7 +41,7 @@ def contact_sheet(category: str, columns: int = 6, open_fraction: float = 0.35) 
             table_material=Material(color=(0.75, 0.74, 0.72), roughness=0.9),
         )
         add_lights(scene.sapien_scene, rng)
-        view = ViewDistribution(fov_y=(0.5, 0.5)).sample(rng, 240, 180)
+        view = replace(ViewDistribution.around(obj), fov_y=(0.5, 0.5)).sample(rng, 240, 180)
         pictures.append(RenderedCamera(scene.sapien_scene, view).take()[0])
         scene.close()
     return np.concatenate(pictures, axis=1)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from artgym.annotation.filter import FilterConfig, Verdict, judge
 from artgym.annotation.trial import TrialConfig, try_grasp
+from artgym.errors import InvalidArgumentError
 from artgym.files import Manifest, read_arrays, write_arrays
 from artgym.geometry import transforms
 from artgym.geometry.grasps import NUM_CANDIDATES, candidate_rotations
@@ -32,6 +33,8 @@ Array = NDArray[np.floating]
 
 #: The part whose grasps are labelled and that moves in the tasks of one-jointed objects.
 MOVABLE_PART = 1
+
+_SHIPPED_LABELS = Path(__file__).parent / "labels"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +109,7 @@ def annotate(
 ) -> dict[str, NDArray[Any]]:
     """Labels one object; the arrays of ``Labels`` by name, a function of id and config alone."""
     obj = catalog.load(object_id)
-    category = catalog.category(obj.category)
+    category = catalog.category_of(obj)
     rng = np.random.default_rng([config.seed, zlib.crc32(object_id.encode())])
     latest_start = category.start_fraction[1]
     fractions = [rng.uniform(*category.start_fraction) for _ in range(config.start_states)]
@@ -120,9 +123,12 @@ def _annotate_state(
     obj: ArticulatedObject, fraction: float, config: AnnotationConfig, rng: np.random.Generator
 ) -> tuple[NDArray[Any], ...]:
     part = MOVABLE_PART
-    q = obj.rest_positions.copy()
-    q[part - 1] = obj.joint_of(part).position(fraction)
+    q = obj.positions_with(part, fraction)
     points, normals = visible_points(obj, q, part, config.points, config.views, config.yaw, rng)
+    if not len(points):
+        raise InvalidArgumentError(
+            f"{obj.object_id}: no camera sees {obj.links[part].name!r}, so that it has no labels"
+        )
     R_grasps = candidate_rotations(normals)
     verdicts = judge(obj, q, part, points, R_grasps, config.filter)
     success = np.zeros(verdicts.shape, dtype=bool)
@@ -153,8 +159,8 @@ def visible_points(
 ) -> tuple[Array, Array]:
     """Surface points (count, 3) of a part that cameras can see, and normals, object frame.
 
-    Small shapes, handles above all, get more points than their area: a shape's share goes with
-    the square root of the area seen.
+    Of a part that no camera sees there are none. Small shapes, handles above all, get more points
+    than their area: a shape's share goes with the square root of the area seen.
     """
     width, height = 160, 120
     Ts_object_link = obj.link_poses(q)
@@ -162,8 +168,9 @@ def visible_points(
     _, shape_index = link_triangles(obj.links[part])
     triangle_normals = transforms.rotate(Ts_object_link[part], bodies[part].normals())
     points, normals, shapes = [], [], []
+    cameras = ViewDistribution.around(obj)
     for _ in range(views):
-        view = ViewDistribution().sample(rng, width, height)
+        view = cameras.sample(rng, width, height)
         turn = rng.uniform(-yaw, yaw)
         c, s = np.cos(turn), np.sin(turn)
         T_object_world = transforms.transform_from([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.zeros(3))
@@ -176,8 +183,11 @@ def visible_points(
         normals.append(triangle_normals[hits.triangle[seen]])
         shapes.append(shape_index[hits.triangle[seen]])
     shape = np.concatenate(shapes)
+    if not len(shape):
+        return np.empty((0, 3)), np.empty((0, 3))
     weight = 1.0 / np.sqrt(np.bincount(shape))[shape]
-    chosen = rng.choice(len(shape), size=count, replace=False, p=weight / weight.sum())
+    # A part of which little is seen gives the same points more than once.
+    chosen = rng.choice(len(shape), count, replace=len(shape) < count, p=weight / weight.sum())
     return np.concatenate(points)[chosen], np.concatenate(normals)[chosen]
 
 
@@ -224,7 +234,7 @@ def label_file_name(object_id: str) -> str:
 
 def labels_folder(category: str, split: str, root: Path | None = None) -> Path:
     """Where the label files of a category's split lie; the shipped ones by default."""
-    return (root or Path(__file__).parent / "labels") / category / split
+    return (root or _SHIPPED_LABELS) / category / split
 
 
 def read_labels(object_id: str, root: Path | None = None) -> Labels:
@@ -239,7 +249,13 @@ def read_labels(object_id: str, root: Path | None = None) -> Labels:
     return Labels(object_id=object_id, **arrays)
 
 
+def labelled_categories(root: Path | None = None) -> tuple[str, ...]:
+    """Categories that have labels; shipped ones by default."""
+    folder = root or _SHIPPED_LABELS
+    return tuple(sorted(path.name for path in folder.iterdir() if path.is_dir()))
+
+
 def labelled_ids(category: str, split: str, root: Path | None = None) -> Sequence[str]:
     """Ids of the objects of a split that have labels, sorted."""
     files = sorted(labels_folder(category, split, root).glob(f"{category}_*.h5"))
-    return [f.stem.replace("_", "/") for f in files]
+    return [f"{category}/{f.stem.removeprefix(category + '_')}" for f in files]

@@ -88,14 +88,22 @@ def judge(
     ]
     cloud = np.concatenate(clouds)
     on_part = np.concatenate([np.full(len(c), i == part) for i, c in enumerate(clouds)])
+    # Most of a large object is out of the hand's reach.
+    reached = np.all(
+        (cloud > points_object.min(axis=0) - _HAND_RADIUS)
+        & (cloud < points_object.max(axis=0) + _HAND_RADIUS),
+        axis=1,
+    )
+    cloud, on_part = cloud[reached], on_part[reached]
     verdicts = np.empty(R_object_grasps.shape[:2], dtype=np.int8)
     for i, point in enumerate(points_object):
-        distance = np.linalg.norm(cloud - point, axis=1)
-        near = np.flatnonzero(distance < _HAND_RADIUS)
+        offset = cloud - point
+        squared = np.einsum("ij,ij->i", offset, offset)
+        near = np.flatnonzero(squared < _HAND_RADIUS**2)
         # Nearest first: most collisions show at once.
-        near = near[np.argsort(distance[near], kind="stable")]
+        near = near[np.argsort(squared[near], kind="stable")]
         _judge_point(
-            np.ascontiguousarray(cloud[near] - point),
+            np.ascontiguousarray(offset[near]),
             on_part[near],
             float(point[2]),
             np.ascontiguousarray(R_object_grasps[i]),

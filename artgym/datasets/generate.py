@@ -89,12 +89,10 @@ def _make_sample(
     config: GenerationConfig,
     rng: np.random.Generator,
 ) -> Sample:
-    q = obj.rest_positions.copy()
-    joint = obj.joint_of(MOVABLE_PART)
-    q[MOVABLE_PART - 1] = joint.position(float(labels.fractions[state]))
+    q = obj.positions_with(MOVABLE_PART, float(labels.fractions[state]))
     for _ in range(20):
         T_world_object = random_placement(rng)
-        view = ViewDistribution().sample(rng, *config.camera_size)
+        view = ViewDistribution.around(obj).sample(rng, *config.camera_size)
         rgb, depth = _picture(obj, T_world_object, q, view, rng)
         part_mask, normals_world = _part_mask(obj, T_world_object, q, view, depth)
         points_camera = points_from_depth(depth, view.intrinsics)

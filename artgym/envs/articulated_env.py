@@ -16,7 +16,7 @@ from artgym.control import MAX_ROTATION, MAX_TRANSLATION, MAX_WIDTH
 from artgym.envs.observations import STATE_FIELDS, ObsMode, observation_space
 from artgym.errors import InvalidArgumentError, NotReadyError, UnknownNameError
 from artgym.geometry import transforms
-from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
+from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject
 from artgym.sim import rays
@@ -25,7 +25,7 @@ from artgym.sim.conversion import pose_from_transform
 from artgym.sim.renderer import own_render_system
 from artgym.sim.robots import T_hand_tcp
 from artgym.sim.scene import ManipulationScene, PartContact, PhysicsConfig
-from artgym.sim.setting import add_lights, random_placement, random_table
+from artgym.sim.setting import add_lights, random_hand_start, random_placement, random_table
 from artgym.tasks import rewards
 from artgym.tasks.rewards import RewardMode
 from artgym.tasks.success import (
@@ -40,7 +40,7 @@ Array = NDArray[np.floating]
 #: Simulator steps in one control step: 20 Hz.
 SUBSTEPS = 6
 #: The hand's target stays inside this box, metres.
-WORKSPACE_LOW, WORKSPACE_HIGH = np.array([-0.8, -0.8, 0.0]), np.array([0.8, 0.8, 1.0])
+WORKSPACE_LOW, WORKSPACE_HIGH = np.array([-1.2, -1.2, 0.0]), np.array([1.5, 1.2, 2.2])
 #: A joint faster than this (m/s or rad/s), or a hand this far out, is a blow-up.
 MAX_STABLE_SPEED, MAX_STABLE_DISTANCE = 40.0, 3.0
 #: An episode ends when the part has travelled this far in success.
@@ -85,7 +85,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
     **Arguments.**
 
     Args:
-        categories: categories to draw objects from.
+        categories: categories to draw objects from; by default all that have such a split.
         split: "train", "val" or "test".
         objects: ids to draw from instead of whole categories.
         obs_mode: see above.
@@ -106,7 +106,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
     def __init__(
         self,
         *,
-        categories: Sequence[str] = tuple(catalog.CATEGORIES),
+        categories: Sequence[str] | None = None,
         split: str = "train",
         objects: Sequence[str] | None = None,
         obs_mode: ObsMode = "state",
@@ -141,7 +141,7 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self.camera_size = camera_size
         self.num_points = num_points
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
-        num_parts = max(catalog.load(i).num_parts for i in self._object_ids[:1])
+        num_parts = max(_most_parts(i) for i in self._object_ids)
         self.observation_space = observation_space(obs_mode, camera_size, num_points, num_parts)
         # One renderer serves observations and render(); state mode alone needs none.
         self._needs_renderer = obs_mode == "rgbd" or render_mode == "rgb_array"
@@ -205,21 +205,17 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             raise NotReadyError("reset() after close(): make a new environment.")
         object_id, fraction = self._read_options(options or {})
         rng = self.np_random
-        drawn_id = self._object_ids[int(rng.integers(len(self._object_ids)))]
-        self._object = catalog.load(object_id or drawn_id)
-        category = catalog.category(self._object.category)
+        drawn = self._draw_object(rng)
+        self._object = drawn if object_id is None else catalog.load(object_id)
+        category = catalog.category_of(self._object)
         drawn_fraction = float(rng.uniform(*category.start_fraction))
         self._T_world_object = random_placement(rng)
         self._joint = self._object.joint_of(self.target_part)
-        q = self._object.rest_positions.copy()
-        q[self.target_part - 1] = self._joint.position(
-            drawn_fraction if fraction is None else fraction
+        q = self._object.positions_with(
+            self.target_part, drawn_fraction if fraction is None else fraction
         )
-        T_world_tcp = transforms.transform_from(
-            frame_from_z([0.0, 0.0, -1.0], rng.uniform(-np.pi / 2, np.pi / 2)),
-            rng.uniform([0.05, -0.2, 0.62], [0.25, 0.2, 0.72]),
-        )
-        self._view = ViewDistribution().sample(rng, *self.camera_size)
+        T_world_tcp = random_hand_start(rng, self._object)
+        self._view = ViewDistribution.around(self._object).sample(rng, *self.camera_size)
         table = random_table(rng)
         light_seed = int(rng.integers(2**31))
         self._cloud_rng = np.random.default_rng(int(rng.integers(2**31)))
@@ -303,6 +299,14 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         """Frees the scene; may be called again."""
         self._drop_scene()
         self._closed = True
+
+    def _draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
+        """One of the objects that have the target part."""
+        while True:
+            object_id = self._object_ids[int(rng.integers(len(self._object_ids)))]
+            obj = catalog.load(object_id)
+            if self.target_part < obj.num_parts:
+                return obj
 
     # -- parts of a step -----------------------------------------------------------------------
 
@@ -459,27 +463,38 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
 
 
 def _drawable_ids(
-    categories: Sequence[str], split: str, objects: Sequence[str] | None, target_part: int
+    categories: Sequence[str] | None,
+    split: str,
+    objects: Sequence[str] | None,
+    target_part: int,
 ) -> tuple[str, ...]:
-    """Ids to draw from, each known and with the asked part."""
-    if isinstance(categories, str):
-        categories = (categories,)
+    """Ids to draw from, each known and, where it is named, with the asked part."""
     if objects is not None:
-        ids = tuple((objects,) if isinstance(objects, str) else objects)
+        ids = (objects,) if isinstance(objects, str) else tuple(objects)
         for object_id in ids:
-            catalog.load(object_id)
+            catalog.load(object_id).joint_of(target_part)
     else:
-        ids = tuple(i for name in categories for i in catalog.object_ids(name, split))  # type: ignore[arg-type]
+        names = catalog.categories_with(split) if categories is None else categories
+        names = (names,) if isinstance(names, str) else tuple(names)
+        for name in names:
+            parts = catalog.category(name).parts
+            if not 1 <= target_part < len(parts):
+                raise InvalidArgumentError(
+                    f"target_part={target_part}: category {name!r} has the movable parts "
+                    + ", ".join(f"{i} ({part})" for i, part in enumerate(parts) if i)
+                )
+        ids = tuple(i for name in names for i in catalog.object_ids(name, split))  # type: ignore[arg-type]
     if not ids:
         raise InvalidArgumentError("no objects to draw from: give categories or objects.")
-    for name in {i.partition("/")[0] for i in ids}:
-        parts = catalog.category(name).parts
-        if not 1 <= target_part < len(parts):
-            raise InvalidArgumentError(
-                f"target_part={target_part}: category {name!r} has the movable parts "
-                + ", ".join(f"{i} ({part})" for i, part in enumerate(parts) if i)
-            )
     return ids
+
+
+def _most_parts(object_id: str) -> int:
+    """The most parts that an object of this kind can have."""
+    name = object_id.partition("/")[0]
+    if name in catalog.CATEGORIES:
+        return len(catalog.CATEGORIES[name].parts)
+    return catalog.load(object_id).num_parts
 
 
 def _require_known(kind: str, name: object, known: Sequence[str]) -> None:

@@ -19,6 +19,9 @@ from artgym.sim.setting import MAX_YAW
 
 Array = NDArray[np.floating]
 
+#: Stay, with closed jaws.
+_HOLD = np.array([0, 0, 0, 0, 0, 0, -1], dtype=np.float32)
+
 
 class ScriptedExpert:
     """Finds a grasp by trial in a scene of its own, then carries it out in the episode.
@@ -46,15 +49,27 @@ class ScriptedExpert:
     def act(self, observation: Any) -> NDArray[np.float32]:
         """The next action; plans whenever nothing is under way."""
         if self._executor.phase == "idle":
-            self._executor.begin(self._plan())
-        return self._executor.action(self._env.tcp_pose(), self._env.jaw_width())
+            plan = self._plan()
+            if plan is None:
+                return _HOLD.copy()
+            self._executor.begin(plan)
+        action = self._executor.action(self._env.tcp_pose(), self._env.jaw_width())
+        if self._env.progress.success and self._executor.phase != "move":
+            # As far as it goes: letting go could only push the part back.
+            return _HOLD.copy()
+        return action
 
-    def _plan(self) -> GraspPlan:
-        """A grasp that succeeds in a copy of the present state; the best filtered one else."""
+    def _plan(self) -> GraspPlan | None:
+        """A grasp that succeeds in a copy of the present state; the best filtered one else.
+
+        None where the part cannot be seen, or gripped anywhere.
+        """
         env = self._env
         obj, part, q = env.object, env.target_part, env.joint_positions()
         joint = obj.joint_of(part)
         T_grasp = self._working_grasp()
+        if T_grasp is None:
+            return None
         R_world_object = env.T_world_object[:3, :3]
         pivot = env.T_world_object @ np.append(joint.pivot, 1.0)
         direction = np.sign(joint.range)
@@ -66,13 +81,16 @@ class ScriptedExpert:
             displacement=abs(joint.open - float(q[part - 1])),
         )
 
-    def _working_grasp(self) -> Array:
+    def _working_grasp(self) -> Array | None:
         """``T_object_grasp`` (4, 4): one that also succeeds a little off its pose, if there is."""
         env = self._env
         obj, part, q = env.object, env.target_part, env.joint_positions()
         working: list[Array] = []
+        T_object_grasp: Array | None = None
         for _ in range(3):
             points, normals = visible_points(obj, q, part, self._points, 4, MAX_YAW, self._rng)
+            if not len(points):
+                continue
             R_grasps = candidate_rotations(normals)
             possible = np.argwhere(judge(obj, q, part, points, R_grasps) == Verdict.POSSIBLE)
             for i, c in self._rng.permutation(possible)[: self._trials]:

@@ -1,6 +1,7 @@
 """Which objects and categories there are: ids, splits, start states.
 
 An id is ``category/number``; the number is the seed, so an id names the same object everywhere.
+Ids of objects imported on this machine are ``import/name``.
 """
 
 from __future__ import annotations
@@ -10,13 +11,14 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from artgym.errors import InvalidArgumentError, UnknownNameError
+from artgym.objects import store
 from artgym.objects.model import ArticulatedObject
-from artgym.objects.procedural import GENERATORS
+from artgym.objects.procedural import generator
 
 Split = Literal["train", "val", "test"]
 
@@ -24,6 +26,11 @@ Split = Literal["train", "val", "test"]
 SPLITS: Mapping[str, range] = MappingProxyType(
     {"train": range(0, 1000), "val": range(1000, 1200), "test": range(1200, 1600)}
 )
+#: All numbers, of whatever split.
+ALL_NUMBERS = range(0, 1600)
+
+#: Start interval of categories whose closed part offers nothing to grip.
+_AJAR = (0.06, 0.1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,37 +39,53 @@ class Category:
 
     Attributes:
         name: the category's name, the first half of its objects' ids.
-        parts: part names in order, base first.
+        parts: part names in order, base first. An object has the first so many of them.
         start_fraction: interval of the open fraction at which an opening episode starts. Up to
             0.05; up to 0.1 where the closed part offers nothing to grip.
-        size: smallest and largest plausible extent of an object, metres, for soundness.
+        size: smallest and largest plausible extent of an object without its stand, metres.
+        held_out: kept out of all training: every object belongs to the test split.
     """
 
     name: str
     parts: tuple[str, ...]
-    start_fraction: tuple[float, float]
     size: tuple[float, float]
+    start_fraction: tuple[float, float] = (0.0, 0.05)
+    held_out: bool = False
 
 
+def _category(name: str, parts: str, smallest: float, largest: float, **more: Any) -> Category:
+    return Category(name=name, parts=tuple(parts.split()), size=(smallest, largest), **more)
+
+
+#: Every category; four are held out: a side-hinged door, two lids, and something else altogether.
 CATEGORIES: Mapping[str, Category] = MappingProxyType(
     {
         c.name: c
         for c in (
-            Category(
-                name="drawer",
-                parts=("body", "drawer"),
-                start_fraction=(0.0, 0.05),
-                size=(0.10, 0.60),
-            ),
-            Category(
-                name="laptop",
-                parts=("base", "lid"),
-                start_fraction=(0.06, 0.1),
-                size=(0.015, 0.45),
-            ),
+            _category("box", "body lid_1 lid_2 lid_3 lid_4", 0.015, 0.50, start_fraction=_AJAR),
+            _category("cabinet", "body door_1 door_2", 0.12, 1.10),
+            _category("cutter", "body slider", 0.008, 0.26),
+            _category("dishwasher", "body door", 0.35, 0.95),
+            _category("door", "frame door", 0.05, 2.30),
+            _category("drawer", "body drawer_1 drawer_2 drawer_3 drawer_4", 0.06, 0.95),
+            _category("eyeglasses", "frame temple_1 temple_2", 0.01, 0.20, start_fraction=_AJAR),
+            _category("faucet", "base handle spout", 0.03, 0.50, held_out=True),
+            _category("laptop", "base lid", 0.015, 0.45, start_fraction=_AJAR),
+            _category("microwave", "body door", 0.20, 0.65),
+            _category("oven", "body door", 0.20, 1.00),
+            _category("refrigerator", "body door_1 door_2", 0.35, 1.95),
+            _category("safe", "body door", 0.15, 0.75, held_out=True),
+            _category("scissors", "half_1 half_2", 0.006, 0.25, start_fraction=_AJAR),
+            _category("stapler", "base arm", 0.02, 0.25),
+            _category("suitcase", "body lid", 0.08, 0.85, held_out=True),
+            _category("toilet", "bowl lid", 0.30, 0.95, held_out=True),
+            _category("trash_can", "body lid", 0.12, 0.85),
         )
     }
 )
+
+#: What is assumed of an imported object of no category here.
+OTHER = _category("other", "base part", 0.01, 2.5)
 
 
 def category(name: str) -> Category:
@@ -77,6 +100,22 @@ def category(name: str) -> Category:
         raise UnknownNameError("category", name, CATEGORIES) from None
 
 
+def category_of(obj: ArticulatedObject) -> Category:
+    """An object's category; ``OTHER`` where it is none of the catalogue's."""
+    return CATEGORIES.get(obj.category, OTHER)
+
+
+def categories_with(split: str) -> tuple[str, ...]:
+    """Names of the categories that have objects in a split: held-out ones only in "test".
+
+    Raises:
+        UnknownNameError: unknown split.
+    """
+    if split not in SPLITS:
+        raise UnknownNameError("split", split, SPLITS)
+    return tuple(n for n, c in CATEGORIES.items() if split == "test" or not c.held_out)
+
+
 def object_ids(category_name: str, split: Split, count: int | None = None) -> tuple[str, ...]:
     """The first ``count`` ids of a split, all of them by default.
 
@@ -84,40 +123,81 @@ def object_ids(category_name: str, split: Split, count: int | None = None) -> tu
         UnknownNameError: unknown category or split.
         InvalidArgumentError: the split has fewer objects than asked for.
     """
-    category(category_name)
+    held_out = category(category_name).held_out
     if split not in SPLITS:
         raise UnknownNameError("split", split, SPLITS)
     numbers = SPLITS[split]
+    if held_out:
+        if split != "test":
+            raise InvalidArgumentError(
+                f"category {category_name!r} is held out of training: it has no {split!r} split, "
+                'only "test"'
+            )
+        numbers = ALL_NUMBERS
+    return _first_ids(category_name, numbers, count, f"{category_name}/{split}")
+
+
+def all_ids(category_name: str, count: int | None = None) -> tuple[str, ...]:
+    """The first ``count`` ids of a category whatever their split, all of them by default.
+
+    Raises:
+        UnknownNameError: unknown category.
+        InvalidArgumentError: there are fewer.
+    """
+    category(category_name)
+    return _first_ids(category_name, ALL_NUMBERS, count, category_name)
+
+
+def _first_ids(name: str, numbers: range, count: int | None, described: str) -> tuple[str, ...]:
     if count is not None and not 0 < count <= len(numbers):
         raise InvalidArgumentError(
-            f"count={count} objects of {category_name}/{split}: expected 1 to {len(numbers)}"
+            f"count={count} objects of {described}: expected 1 to {len(numbers)}"
         )
-    return tuple(f"{category_name}/{n:04d}" for n in numbers[:count])
+    return tuple(f"{name}/{n:04d}" for n in numbers[:count])
 
 
 def split_of(object_id: str) -> Split:
-    """The split an object belongs to."""
-    _, number = _parse(object_id)
+    """The split an object belongs to; imported ones are never trained on."""
+    if store.is_imported(object_id):
+        return "test"
+    name, number = _parse(object_id)
+    if category(name).held_out:
+        return "test"
     return next(split for split, numbers in SPLITS.items() if number in numbers)  # type: ignore[return-value]
 
 
-@functools.lru_cache(maxsize=256)
 def load(object_id: str) -> ArticulatedObject:
     """The object of an id; immutable, so repeated calls share it.
 
     Raises:
         UnknownNameError: the id is not in the catalogue; names the nearest.
+        DamagedFileError: the files of an imported object cannot be read.
+    """
+    return store.load(object_id) if store.is_imported(object_id) else _kept(object_id)
+
+
+@functools.lru_cache(maxsize=256)
+def _kept(object_id: str) -> ArticulatedObject:
+    return build(object_id)
+
+
+def build(object_id: str) -> ArticulatedObject:
+    """As ``load``, for objects of the catalogue's own categories, and made anew at each call.
+
+    Raises:
+        UnknownNameError: as for ``load``.
     """
     category_name, number = _parse(object_id)
     # A category's stream must not follow another's, and Python's own hash changes by process.
     seed = [zlib.crc32(category_name.encode()), number]
-    return GENERATORS[category_name](object_id, np.random.default_rng(seed))
+    return generator(category_name)(object_id, np.random.default_rng(seed))
 
 
 def _parse(object_id: str) -> tuple[str, int]:
     """Category and number of an id."""
     name, _, number = str(object_id).partition("/")
-    category(name)
+    if name not in CATEGORIES:
+        raise UnknownNameError("category", name, (*CATEGORIES, store.PREFIX))
     last = max(numbers.stop for numbers in SPLITS.values())
     if not (number.isascii() and number.isdigit() and len(number) == 4 and int(number) < last):
         known = [f"{name}/0000", f"{name}/{last - 1:04d}"]

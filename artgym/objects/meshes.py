@@ -9,7 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from artgym.geometry import transforms
-from artgym.objects.model import Box, Cylinder, Link
+from artgym.objects.model import Box, Convex, Geometry, Link
 
 Array = NDArray[np.floating]
 
@@ -17,10 +17,12 @@ _CYLINDER_SECTIONS = 32
 
 
 @functools.lru_cache(maxsize=1024)
-def primitive_mesh(geometry: Box | Cylinder) -> trimesh.Trimesh:
+def primitive_mesh(geometry: Geometry) -> trimesh.Trimesh:
     """A closed mesh about the primitive's own centre."""
     if isinstance(geometry, Box):
         return trimesh.creation.box(2 * np.asarray(geometry.half_size))
+    if isinstance(geometry, Convex):
+        return trimesh.Trimesh(geometry.corners(), geometry.triangles, process=False)
     mesh = trimesh.creation.cylinder(
         geometry.radius, 2 * geometry.half_length, sections=_CYLINDER_SECTIONS
     )
@@ -32,8 +34,16 @@ def primitive_mesh(geometry: Box | Cylinder) -> trimesh.Trimesh:
 
 
 def link_triangles(link: Link) -> tuple[Array, NDArray[np.intp]]:
-    """Triangles (n, 3, 3) of a link in its own frame, and the shape index (n,) of each."""
+    """Triangles (n, 3, 3) of what is seen of a link, in its frame, and which piece (n,) each is of.
+
+    Pieces are the link's visuals where it has any, its shapes otherwise.
+    """
     triangles, shape_index = [], []
+    for i, visual in enumerate(link.visuals):
+        triangles.append(visual.mesh.vertices[visual.mesh.faces])
+        shape_index.append(np.full(len(visual.mesh.faces), i))
+    if link.visuals:
+        return np.concatenate(triangles), np.concatenate(shape_index)
     for i, shape in enumerate(link.shapes):
         mesh = primitive_mesh(shape.geometry)
         corners = transforms.apply(shape.T_link_shape, mesh.triangles.reshape(-1, 3))

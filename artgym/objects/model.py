@@ -11,18 +11,39 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry import transforms
 from artgym.geometry.screw import JointType, joint_motion
+from artgym.objects.contents import Image, TriangleMesh
 
 Vector = tuple[float, float, float]
 Array = NDArray[np.floating]
+
+#: What a piece is for: most are "body"; a "handle" is what a person would take hold of; a "stand"
+#: carries a small object above the table and is no part of its real size.
+Role = Literal["body", "handle", "stand"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Texture:
+    """A pattern drawn over a surface in shades of its colour, the same from the same numbers.
+
+    Attributes:
+        pattern: a name in ``textures.PATTERNS``.
+        seed: which of the pattern's many forms.
+        tile: metres after which it repeats.
+    """
+
+    pattern: str
+    seed: int = 0
+    tile: float = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,11 +54,16 @@ class Material:
         color: linear RGB in [0, 1].
         roughness: 0 mirror, 1 matt.
         metallic: 0 dielectric, 1 metal.
+        texture: a pattern in shades of the colour, or a picture that takes the colour's place.
     """
 
     color: Vector
     roughness: float = 0.6
     metallic: float = 0.0
+    texture: Texture | Image | None = None
+
+
+_BOX_SIGNS = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij"), -1).reshape(-1, 3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +85,7 @@ class Box:
 
     def corners(self) -> Array:
         """Points (n, 3) whose convex hull holds the shape."""
-        signs = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij"), -1).reshape(-1, 3)
-        return signs * np.asarray(self.half_size)
+        return _BOX_SIGNS * np.asarray(self.half_size)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,20 +112,103 @@ class Cylinder:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Convex:
+    """A convex polyhedron: the hull of points (n, 3), n <= 64, about their own origin, metres.
+
+    Raises:
+        InvalidArgumentError: fewer than four points, more than 64, or all in one plane.
+    """
+
+    points: tuple[Vector, ...]
+
+    def __post_init__(self) -> None:
+        if not 4 <= len(self.points) <= 64:
+            raise InvalidArgumentError(
+                f"a convex piece of {len(self.points)} points: expected 4 to 64"
+            )
+
+    @property
+    def volume(self) -> float:
+        """Cubic metres."""
+        return _hull_moments(self)[0]
+
+    @property
+    def centroid(self) -> Array:
+        """Centre of volume (3,) in the polyhedron's own frame."""
+        return _hull_moments(self)[1]
+
+    @property
+    def unit_inertia(self) -> Array:
+        """Inertia (3, 3) about the centroid for a mass of 1 kg."""
+        return _hull_moments(self)[2]
+
+    @property
+    def triangles(self) -> NDArray[np.intp]:
+        """Faces (m, 3) of the hull as indices of points, seen counter-clockwise from outside."""
+        return _hull_triangles(self)
+
+    def corners(self) -> Array:
+        """Points (n, 3) whose convex hull is the shape."""
+        return np.asarray(self.points, dtype=float)
+
+
+@lru_cache(maxsize=4096)
+def _hull_triangles(convex: Convex) -> NDArray[np.intp]:
+    points = convex.corners()
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        raise InvalidArgumentError(
+            f"a convex piece whose {len(points)} points lie in one plane: give it thickness"
+        ) from None
+    faces = hull.simplices.astype(np.intp)
+    a, b, c = points[faces].swapaxes(0, 1)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    faces.setflags(write=False)
+    return faces
+
+
+@lru_cache(maxsize=4096)
+def _hull_moments(convex: Convex) -> tuple[float, Array, Array]:
+    """Volume, centroid and unit inertia, summed over tetrahedra from an inner point."""
+    points = convex.corners()
+    inner = points.mean(axis=0)
+    a, b, c = (points - inner)[_hull_triangles(convex)].swapaxes(0, 1)
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    volume = float(volumes.sum())
+    corners_sum = a + b + c
+    centroid = volumes @ corners_sum / 4.0 / volume
+    # Second moments of a tetrahedron with a corner at the origin.
+    second = sum(np.einsum("i,ij,ik->jk", volumes, v, v) for v in (a, b, c, corners_sum)) / 20.0
+    second = second / volume - np.outer(centroid, centroid)
+    inertia = np.trace(second) * np.eye(3) - second
+    for array in (centroid, inertia):
+        array.setflags(write=False)
+    return volume, centroid + inner, inertia
+
+
+#: The kinds of convex pieces.
+Geometry = Box | Cylinder | Convex
+
+
+@dataclass(frozen=True, kw_only=True)
 class Shape:
-    """A convex piece of a link: at once what is seen and what collides.
+    """A convex piece of a link: what collides, and what is seen unless the link has visuals.
 
     Attributes:
         geometry: the primitive.
-        position: its centre in the link's frame, metres.
+        position: its origin in the link's frame, metres.
         rotation: its axes in the link's frame, rows of a 3x3 matrix.
         material: how it looks.
+        role: what it is for.
     """
 
-    geometry: Box | Cylinder
+    geometry: Geometry
     position: Vector
     material: Material
     rotation: tuple[Vector, Vector, Vector] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    role: Role = "body"
 
     @cached_property
     def T_link_shape(self) -> Array:
@@ -111,6 +219,42 @@ class Shape:
         """Points (n, 3) in the link's frame whose hull holds the shape."""
         return transforms.apply(self.T_link_shape, self.geometry.corners())
 
+    @cached_property
+    def centroid_link(self) -> Array:
+        """Centre of volume (3,) in the link's frame."""
+        position = np.asarray(self.position, dtype=float)
+        if isinstance(self.geometry, Convex):
+            return position + np.asarray(self.rotation, dtype=float) @ self.geometry.centroid
+        return position
+
+
+@dataclass(frozen=True, kw_only=True)
+class Visual:
+    """Triangles that are seen and touch nothing, in the link's frame.
+
+    Attributes:
+        mesh: the triangles, metres.
+        material: how they look.
+    """
+
+    mesh: TriangleMesh
+    material: Material
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inertial:
+    """Mass properties as a file states them, where the density is not uniform.
+
+    Attributes:
+        mass: kilograms.
+        center_of_mass: in the link's frame, metres.
+        inertia: rows of a 3x3 matrix, kg m^2, about the centre of mass, axes of the link's frame.
+    """
+
+    mass: float
+    center_of_mass: Vector
+    inertia: tuple[Vector, Vector, Vector]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
@@ -119,43 +263,58 @@ class Link:
     Attributes:
         name: unique in its object; for movable parts the word a person would use.
         shapes: its convex pieces.
-        density: kg per cubic metre, uniform.
+        density: kg per cubic metre, uniform; unused where ``inertial`` is given.
         friction: Coulomb coefficient of its surface.
+        visuals: what is seen in place of the shapes, if anything.
+        inertial: mass properties in place of the density's.
     """
 
     name: str
     shapes: tuple[Shape, ...]
-    density: float
+    density: float = 1000.0
     friction: float = 0.8
+    visuals: tuple[Visual, ...] = ()
+    inertial: Inertial | None = None
 
     @cached_property
     def mass(self) -> float:
         """Kilograms."""
+        if self.inertial is not None:
+            return self.inertial.mass
         return self.density * sum(s.geometry.volume for s in self.shapes)
 
     @cached_property
     def center_of_mass(self) -> Array:
         """(3,) in the link's frame, metres."""
+        if self.inertial is not None:
+            return np.asarray(self.inertial.center_of_mass, dtype=float)
         weights = np.array([s.geometry.volume for s in self.shapes])
-        centers = np.array([s.position for s in self.shapes], dtype=float)
+        centers = np.array([s.centroid_link for s in self.shapes])
         return weights @ centers / weights.sum()
 
     @cached_property
     def inertia(self) -> Array:
         """(3, 3), kg m^2, about the centre of mass, in the axes of the link's frame."""
+        if self.inertial is not None:
+            return np.asarray(self.inertial.inertia, dtype=float)
         center, total = self.center_of_mass, np.zeros((3, 3))
         for shape in self.shapes:
             mass = self.density * shape.geometry.volume
             R = np.asarray(shape.rotation, dtype=float)
-            d = np.asarray(shape.position) - center
+            d = shape.centroid_link - center
             total += mass * (R @ shape.geometry.unit_inertia @ R.T)
             total += mass * (d @ d * np.eye(3) - np.outer(d, d))
         return total
 
-    def bounds(self) -> Array:
-        """Axis-aligned box (2, 3), min and max, in the link's frame."""
-        corners = np.concatenate([s.corners_link() for s in self.shapes])
-        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+    def bounds(self, roles: tuple[Role, ...] | None = None) -> Array:
+        """Axis-aligned box (2, 3), min and max, in the link's frame.
+
+        Args:
+            roles: only pieces of these; all by default. Without such a piece it is +inf, -inf.
+        """
+        chosen = [s.corners_link() for s in self.shapes if roles is None or s.role in roles]
+        corners = np.concatenate([np.empty((0, 3)), *chosen])
+        return np.stack([corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -270,19 +429,34 @@ class ArticulatedObject:
         """Joint positions (K - 1,) of the rest state."""
         return np.array([joint.closed for joint in self.joints])
 
+    def positions_with(self, part: int, fraction: float) -> Array:
+        """Joint positions (K - 1,) with one part at an open fraction and all others closed."""
+        q = self.rest_positions
+        q[part - 1] = self.joint_of(part).position(fraction)
+        return q
+
     @cached_property
     def rest_bounds(self) -> Array:
         """Axis-aligned box (2, 3) of the whole object at rest, object frame: NAOCS's box."""
         bounds = np.stack([link.bounds() for link in self.links])
         return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
-    def grip_point(self, part: int) -> Array:
-        """The point (3,) of a part, in its own frame, that its joint moves most plainly.
+    @cached_property
+    def body_bounds(self) -> Array:
+        """As ``rest_bounds``, without stands: the size a person would measure."""
+        bounds = np.stack([link.bounds(roles=("body", "handle")) for link in self.links])
+        return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
-        The middle of what lies farthest along a slide, or farthest from a hinge: a drawer's
-        handle, a lid's front edge. Privileged knowledge, for rewards and state observations.
+    def grip_point(self, part: int) -> Array:
+        """The point (3,) of a part, in its own frame, where a hand moves it most easily.
+
+        The middle of its handle; without one, of what lies farthest along a slide or farthest
+        from a hinge: a lid's front edge. Privileged knowledge, for rewards and state observations.
         """
         joint = self.joint_of(part)
+        handle = self.links[part].bounds(roles=("handle",))
+        if np.all(np.isfinite(handle)):
+            return handle.mean(axis=0)
         corners = np.concatenate([s.corners_link() for s in self.links[part].shapes])
         axis = np.asarray(joint.axis)
         if joint.type == "prismatic":
@@ -303,7 +477,9 @@ class ArticulatedObject:
 
 def _tokens(value: object) -> Iterator[str]:
     """A value as a flat, unambiguous sequence of texts."""
-    if is_dataclass(value):
+    if isinstance(value, (TriangleMesh, Image)):
+        yield f"{type(value).__name__} {value.digest}"
+    elif is_dataclass(value):
         yield type(value).__name__
         for item in fields(value):
             yield item.name
@@ -316,6 +492,9 @@ def _tokens(value: object) -> Iterator[str]:
         yield f"tuple {len(value)}"
         for item in value:
             yield from _tokens(item)
+    elif isinstance(value, float):
+        # numpy's own repr names the type, and has changed before.
+        yield float.__repr__(value)
     else:
         yield repr(value)
 

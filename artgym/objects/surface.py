@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,12 +14,14 @@ from artgym.objects.model import Link
 Array = NDArray[np.floating]
 
 
+@functools.lru_cache(maxsize=32)
 def grid_points(link: Link, spacing: float) -> Array:
     """Points (n, 3) in the link's frame that cover its surface, at most ``spacing`` metres apart.
 
-    Deterministic; every face of every shape has points, however thin.
+    Deterministic; every face of every shape has points, however thin. Cached, since links are
+    immutable; so is the result.
     """
-    return np.concatenate(
+    points = np.concatenate(
         [
             transforms.apply(
                 shape.T_link_shape, _cover(primitive_mesh(shape.geometry).triangles, spacing)
@@ -25,6 +29,8 @@ def grid_points(link: Link, spacing: float) -> Array:
             for shape in link.shapes
         ]
     )
+    points.setflags(write=False)
+    return points
 
 
 def _cover(triangles: Array, spacing: float) -> Array:
@@ -37,4 +43,4 @@ def _cover(triangles: Array, spacing: float) -> Array:
         u, v = np.meshgrid(np.arange(m + 1) / m, np.arange(n + 1) / n, indexing="ij")
         inside = u + v <= 1.0 + 1e-9
         points.append(a + u[inside][:, None] * along + v[inside][:, None] * across)
-    return np.unique(np.concatenate(points).round(6), axis=0)
+    return np.concatenate(points).round(6)

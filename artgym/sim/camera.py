@@ -12,12 +12,13 @@ import sapien
 from numpy.typing import NDArray
 
 from artgym.geometry.camera import intrinsics_from_fov, look_at
+from artgym.objects.model import ArticulatedObject
 from artgym.sim.conversion import R_SIMCAM_CAMERA, pose_from_transform
 
 Array = NDArray[np.floating]
 
 #: Nothing nearer or farther is seen, metres.
-NEAR, FAR = 0.05, 5.0
+NEAR, FAR = 0.05, 6.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +62,28 @@ class ViewDistribution:
         (0.04, 0.04, 0.03),
     )
     fov_y: tuple[float, float] = (0.55, 0.7)
+
+    @classmethod
+    def around(cls, obj: ArticulatedObject) -> ViewDistribution:
+        """Cameras that see an object well: nearer to small ones, farther from large ones."""
+        low, high = obj.body_bounds
+        diagonal = float(np.linalg.norm(high - low))
+        # Table-top objects of 0.25 to 0.75 m fill the picture from the standard distance; the top
+        # of a tall one would be out of it.
+        tall = high[2] > 0.42
+        scale = np.clip(diagonal / np.clip(diagonal, 0.25, 0.6 if tall else 0.75), 0.55, 3.0)
+        if scale == 1.0 and not tall:
+            return cls()
+        standard = cls()
+        near, far = standard.distance
+        (x, y, _), half = standard.target
+        return cls(
+            distance=(scale * near, scale * far),
+            target=(
+                (scale * x, y, float(low[2] + high[2]) / 2),
+                (scale * half[0], scale * half[1], scale * half[2]),
+            ),
+        )
 
     def sample(self, rng: np.random.Generator, width: int, height: int) -> View:
         """Draws one camera."""

@@ -6,8 +6,9 @@ costs about a millisecond.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -16,9 +17,27 @@ from numpy.typing import NDArray
 from sapien import physx
 
 from artgym.geometry.transforms import transform_from
-from artgym.objects.model import ArticulatedObject, Box, Cylinder, Link, Material, Shape
-from artgym.sim.conversion import pose_from_transform, transform_from_pose
+from artgym.objects.contents import Image
+from artgym.objects.model import (
+    ArticulatedObject,
+    Box,
+    Cylinder,
+    Geometry,
+    Link,
+    Material,
+    Shape,
+    Texture,
+    Vector,
+    Visual,
+)
+from artgym.objects.textures import texture_pixels
+from artgym.sim.conversion import (
+    pose_from_transform,
+    poses_from_transforms,
+    transform_from_pose,
+)
 from artgym.sim.robots import FloatingHand, HandControl
+from artgym.sim.surfaces import Surface, flat_surface, piece_surface
 
 Array = NDArray[np.floating]
 
@@ -87,7 +106,7 @@ class ArticulatedBody:
             entity.name = link.name
             entity.add_component(body)
             if visuals:
-                entity.add_component(visual_body(link.shapes))
+                entity.add_component(link_visual(link))
             if joint is None:
                 body.joint.type = "fixed"
             else:
@@ -249,17 +268,26 @@ def _surface(friction: float) -> physx.PhysxMaterial:
     return physx.PhysxMaterial(friction, friction, 0.0)
 
 
+_NO_SCALE = np.ones(3, dtype=np.float32)
+
+
+def _collision_shape(
+    geometry: Geometry, material: physx.PhysxMaterial
+) -> physx.PhysxCollisionShape:
+    if isinstance(geometry, Box):
+        return physx.PhysxCollisionShapeBox(geometry.half_size, material)
+    if isinstance(geometry, Cylinder):
+        return physx.PhysxCollisionShapeCylinder(geometry.radius, geometry.half_length, material)
+    points = geometry.corners().astype(np.float32)
+    return physx.PhysxCollisionShapeConvexMesh(points, _NO_SCALE, material)
+
+
 def _attach_shapes(body: physx.PhysxArticulationLinkComponent, link: Link, group: int) -> None:
     material = _surface(link.friction)
-    for piece in link.shapes:
-        geometry = piece.geometry
-        if isinstance(geometry, Box):
-            shape = physx.PhysxCollisionShapeBox(geometry.half_size, material)
-        else:
-            shape = physx.PhysxCollisionShapeCylinder(
-                geometry.radius, geometry.half_length, material
-            )
-        shape.local_pose = pose_from_transform(piece.T_link_shape)
+    poses = poses_from_transforms(np.stack([piece.T_link_shape for piece in link.shapes]))
+    for piece, pose in zip(link.shapes, poses, strict=True):
+        shape = _collision_shape(piece.geometry, material)
+        shape.local_pose = pose
         # Links of one object share a bit and never collide with each other.
         shape.set_collision_groups([1, 1, 1 << 2, group])
         body.attach(shape)
@@ -271,21 +299,91 @@ def _attach_shapes(body: physx.PhysxArticulationLinkComponent, link: Link, group
     body.cmass_local_pose = pose_from_transform(transform_from(axes, link.center_of_mass))
 
 
-def visual_body(shapes: Sequence[Shape]) -> sapien.render.RenderBodyComponent:
-    """What cameras see of a link."""
+def link_visual(link: Link) -> sapien.render.RenderBodyComponent:
+    """What cameras see of a link: its visuals, or else its shapes."""
+    if not link.visuals:
+        return visual_body(link.shapes)
     body = sapien.render.RenderBodyComponent()
-    for piece in shapes:
+    for visual in link.visuals:
+        body.attach(_mesh_shape(visual))
+    return body
+
+
+def visual_body(shapes: Sequence[Shape]) -> sapien.render.RenderBodyComponent:
+    """What cameras see of shapes."""
+    body = sapien.render.RenderBodyComponent()
+    if not shapes:
+        return body
+    materials: dict[Material, sapien.render.RenderMaterial] = {}
+    # All at once: one quaternion takes as long as forty.
+    poses = poses_from_transforms(np.stack([piece.T_link_shape for piece in shapes]))
+    for piece, pose in zip(shapes, poses, strict=True):
         look = piece.material
-        material = sapien.render.RenderMaterial(
-            base_color=[*look.color, 1.0], roughness=look.roughness, metallic=look.metallic
-        )
-        geometry = piece.geometry
-        if isinstance(geometry, Cylinder):
+        if look not in materials:
+            materials[look] = _render_material(look)
+        material, geometry = materials[look], piece.geometry
+        # Without a picture to lay over them, boxes and cylinders are cheapest as such.
+        if isinstance(look.texture, Texture):
+            surface = piece_surface(geometry)
+            # Neighbours that are parallel share one picture that runs on from piece to piece.
+            offset = np.asarray(piece.position) @ np.asarray(piece.rotation, dtype=float)
+            shape = _triangle_shape(surface, surface.uv(offset, look.texture.tile), material)
+        elif isinstance(geometry, Cylinder):
             shape = sapien.render.RenderShapeCylinder(
                 geometry.radius, geometry.half_length, material
             )
-        else:
+        elif isinstance(geometry, Box):
             shape = sapien.render.RenderShapeBox(geometry.half_size, material)
-        shape.local_pose = pose_from_transform(piece.T_link_shape)
+        else:
+            shape = _triangle_shape(piece_surface(geometry), None, material)
+        shape.local_pose = pose
         body.attach(shape)
     return body
+
+
+def _mesh_shape(visual: Visual) -> sapien.render.RenderShapeTriangleMesh:
+    """A mesh with its picture; a picture for which the mesh has no place gives way to colour."""
+    mesh, look = visual.mesh, visual.material
+    if isinstance(look.texture, Image) and mesh.uv is None:
+        look = replace(look, texture=None)
+    surface = flat_surface(mesh.vertices[mesh.faces])
+    uv = None
+    if isinstance(look.texture, Texture):
+        uv = surface.uv(np.zeros(3), look.texture.tile)
+    elif mesh.uv is not None:
+        uv = mesh.uv[mesh.faces].reshape(-1, 2)
+    return _triangle_shape(surface, uv, _render_material(look))
+
+
+def _render_material(look: Material) -> sapien.render.RenderMaterial:
+    material = sapien.render.RenderMaterial(
+        base_color=[*look.color, 1.0], roughness=look.roughness, metallic=look.metallic
+    )
+    if look.texture is not None:
+        material.base_color_texture = _render_texture(look.texture, look.color)
+    return material
+
+
+@functools.lru_cache(maxsize=64)
+def _render_texture(texture: Texture | Image, color: Vector) -> sapien.render.RenderTexture2D:
+    """The picture that takes the place of a material's colour; scenes share it."""
+    pixels = texture.pixels if isinstance(texture, Image) else texture_pixels(texture, color)
+    height, width, _ = pixels.shape
+    opaque = np.full((height, width, 4), 255, dtype=np.uint8)
+    opaque[..., :3] = pixels
+    levels = int(np.log2(max(2, min(height, width))))
+    return sapien.render.RenderTexture2D(opaque, "R8G8B8A8Unorm", mipmap_levels=levels, srgb=True)
+
+
+def _triangle_shape(
+    surface: Surface, uv: Array | None, material: sapien.render.RenderMaterial
+) -> sapien.render.RenderShapeTriangleMesh:
+    """Triangles; uv (3 n, 2) are picture coordinates of their corners, v upwards."""
+    if uv is None:
+        uv = np.zeros((len(surface.vertices), 2), dtype=np.float32)
+    else:
+        # The renderer counts a picture's rows from the top.
+        uv = (uv * [1.0, -1.0] + [0.0, 1.0]).astype(np.float32)
+    return sapien.render.RenderShapeTriangleMesh(
+        surface.vertices, surface.triangles, surface.normals, uv, material
+    )

@@ -5,18 +5,32 @@ Episodes and pictures draw from here, so that a network meets in one what it saw
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import sapien
 from numpy.typing import NDArray
 
-from artgym.geometry.rotations import matrix_from_axis_angle
+from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
 from artgym.geometry.transforms import transform_from
-from artgym.objects.model import Material
+from artgym.objects.model import ArticulatedObject, Material, Texture
 
 Array = NDArray[np.floating]
 
 #: Largest turn of an object about the vertical, radians, and largest shift along x and y, metres.
 MAX_YAW, MAX_SHIFT = 0.35, 0.05
+#: A hand starts in front of objects taller than this, and this far from any object, metres.
+_TALL, _CLEARANCE = 0.5, 0.2
+
+#: What covers tables that are not plain: patterns, and the interval of their tile, metres.
+_TABLES: dict[str, tuple[tuple[str, ...], tuple[float, float]]] = {
+    "wood": (("grain", "fine_grain", "planks", "planks", "parquet"), (0.3, 0.65)),
+    "stone": (("granite", "marble", "concrete", "terrazzo"), (0.3, 0.7)),
+    "cloth": (("weave", "twill", "stripes", "gingham", "felt"), (0.1, 0.3)),
+    "tiles": (("tiles", "bricks"), (0.3, 0.7)),
+}
+#: How many forms of each pattern tables have.
+_TABLE_SEEDS = 12
 
 
 def random_placement(rng: np.random.Generator) -> Array:
@@ -26,20 +40,60 @@ def random_placement(rng: np.random.Generator) -> Array:
     return transform_from(matrix_from_axis_angle([0.0, 0.0, yaw]), [*shift, 0.0])
 
 
+def random_hand_start(rng: np.random.Generator, obj: ArticulatedObject) -> Array:
+    """``T_world_tcp`` (4, 4) of a hand that points down, clear of the object.
+
+    Above the object and in front of its middle; well in front of what is taller than a hand's
+    reach above a table.
+    """
+    rotation = frame_from_z([0.0, 0.0, -1.0], rng.uniform(-np.pi / 2, np.pi / 2))
+    position = rng.uniform([0.05, -0.2, 0.62], [0.25, 0.2, 0.72])
+    front, _, top = obj.rest_bounds[1]
+    if top > _TALL:
+        position += [max(0.0, front + _CLEARANCE), 0.0, 0.2]
+    else:
+        position[2] += max(0.0, top + _CLEARANCE - 0.62)
+    return transform_from(rotation, position)
+
+
 def random_table(rng: np.random.Generator) -> Material:
-    """How the table looks: any colour, matt."""
+    """How the table looks: plain, boards, cloth, stone or tiles, of any colour, matt."""
     red, green, blue = rng.uniform(0.2, 0.8, 3).tolist()
-    return Material(color=(red, green, blue), roughness=0.8)
+    plain = Material(color=(red, green, blue), roughness=0.8)
+    kind = rng.choice(("plain", *_TABLES), p=(0.4, 0.25, 0.1, 0.15, 0.1))
+    seed, share, choice = int(rng.integers(_TABLE_SEEDS)), rng.random(), rng.random()
+    if kind == "plain":
+        return plain
+    patterns, (shortest, longest) = _TABLES[str(kind)]
+    texture = Texture(
+        pattern=patterns[int(choice * len(patterns))],
+        seed=seed,
+        tile=round(shortest + share * (longest - shortest), 3),
+    )
+    if kind == "wood":
+        # From a brown as dark as its red to one as pale.
+        paleness = 0.35 + 0.5 * green
+        color = (red, red * (0.45 + 0.4 * paleness), red * (0.15 + 0.6 * paleness * blue))
+        plain = replace(plain, color=color)
+    return replace(plain, texture=texture)
 
 
 def add_lights(scene: sapien.Scene, rng: np.random.Generator) -> None:
-    """Ambient light and one or two lamps from random directions above."""
+    """Ambient light and one or two lamps from random directions above.
+
+    Most rooms are lit evenly and nearly white; some are dim or glaring, some lamps coloured.
+    """
     ambient = rng.uniform(0.25, 0.5)
-    scene.set_ambient_light([ambient] * 3)
+    mood = rng.random()
+    if mood < 0.1:
+        ambient *= 0.5
+    tint = rng.uniform(0.8, 1.0, 3) if rng.random() < 0.2 else np.ones(3)
+    scene.set_ambient_light((ambient * tint).tolist())
     for _ in range(int(rng.integers(1, 3))):
         azimuth, height = rng.uniform(-np.pi, np.pi), rng.uniform(0.6, 1.5)
-        strength = rng.uniform(0.6, 1.6)
+        strength = rng.uniform(0.6, 1.6) * (1.35 if mood > 0.9 else 1.0)
         warmth = rng.uniform(0.85, 1.0)
-        scene.add_directional_light(
-            [np.cos(azimuth), np.sin(azimuth), -height], [strength, strength, strength * warmth]
-        )
+        color = strength * np.array([1.0, 1.0, warmth])
+        if rng.random() < 0.15:
+            color *= rng.uniform(0.65, 1.0, 3)
+        scene.add_directional_light([np.cos(azimuth), np.sin(azimuth), -height], color.tolist())

@@ -7,21 +7,29 @@ it shows, a plausible size, and somewhere to grip it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from sapien import physx
 
 from artgym.geometry import transforms
 from artgym.geometry.grasps import candidate_rotations
 from artgym.objects import catalog
-from artgym.objects.meshes import link_triangles
-from artgym.objects.model import ArticulatedObject, Box, Cylinder, Link
+from artgym.objects.distance import (
+    box_distance,
+    cylinder_distance,
+    geometry_distance,
+    hull_distance,
+    surface_distance,
+)
+from artgym.objects.meshes import primitive_mesh
+from artgym.objects.model import ArticulatedObject, Link
+from artgym.objects.seen import surface_points, uncovered_points
 from artgym.objects.surface import grid_points
 from artgym.sim.conversion import transform_from_pose
-from artgym.sim.rays import link_body
 from artgym.sim.scene import ManipulationScene
 
 Array = NDArray[np.floating]
@@ -49,6 +57,8 @@ HAND_FORCE = 40.0
 MIN_RANGE = 0.01
 #: Seconds without any effort, and how far a joint may creep in them, as a share of its range.
 REST_TIME, MAX_DRIFT = 5.0, 0.01
+#: No link of an object on a table is heavier than this, kilograms.
+MAX_MASS = 1000.0
 #: Open fraction that counts as open, and as closed again.
 OPENED, CLOSED_AGAIN = 0.95, 0.05
 #: How far collision shapes may lie from what is seen, and links inside each other, metres.
@@ -58,7 +68,7 @@ HINGE_RADIUS = 0.006
 
 _PUSH_TIME = 4.0
 _SPACING = 0.007
-_GRIP_POINTS = 24
+_GRIP_POINTS, _SEEN_POINTS = 24, 120
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,31 +126,42 @@ class Soundness:
 def check(obj: ArticulatedObject, judge: GraspJudge) -> Soundness:
     """Measures an object against every rule; takes some tenths of a second.
 
-    Args:
-        obj: the object; its category must be in the catalogue.
-        judge: says which grasps geometry allows (``annotation.filter.judge``).
+    Whatever is wrong with the object, there is a verdict on each rule: what could not be measured
+    counts as broken.
 
-    Raises:
-        UnknownNameError: the category is not in the catalogue.
+    Args:
+        obj: the object.
+        judge: says which grasps geometry allows (``annotation.filter.judge``).
     """
-    category = catalog.category(obj.category)
-    movable = _movable(obj)
-    mass = _mass(obj)
-    verdicts = [movable, mass, _size(obj, category)]
-    if movable.passed and mass.passed:
+    category = catalog.category_of(obj)
+    verdicts = [_movable(obj), _mass(obj), _size(obj, category)]
+    movable, mass, _ = verdicts
+    problem = ""
+    if not movable.passed:
+        problem = "nothing moves"
+    elif not mass.passed:
+        problem = "no mass, or no body's mass"
+    else:
+        try:
+            ManipulationScene(obj, np.eye(4), obj.rest_positions).close()
+        except (RuntimeError, ValueError) as error:
+            problem = f"the simulator refuses it: {error}"
+    if not problem:
+        grips = _grips(obj, category, judge)
         verdicts += [
-            _collision_shape(obj),
+            _collision_shape(obj, grips),
             _penetration(obj),
             _no_drift(obj, category),
             _opens(obj),
             _no_jam(obj),
             _stays_put(obj),
-            _graspable(obj, category, judge),
+            _graspable(obj, grips),
         ]
     else:
-        note = "not measured: " + ("no mass" if movable.passed else "nothing moves")
         verdicts += [
-            Verdict(rule=rule, value=math.nan, relation="<=", bar=0.0, note=note)
+            Verdict(
+                rule=rule, value=math.nan, relation="<=", bar=0.0, note=f"not measured: {problem}"
+            )
             for rule in get_args(Rule)[len(verdicts) :]
         ]
     return Soundness(object_id=obj.object_id, verdicts=tuple(verdicts))
@@ -174,26 +195,27 @@ def _movable(obj: ArticulatedObject) -> Verdict:
 
 
 def _mass(obj: ArticulatedObject) -> Verdict:
-    """The smallest mass or principal moment of inertia; 0 where a body cannot have such moments."""
+    """The smallest mass or principal moment of inertia; 0 where no body has such masses."""
 
     def smallest(link: Link) -> float:
         if not (math.isfinite(link.mass) and np.all(np.isfinite(link.inertia))):
             return math.nan
         moments = np.linalg.eigvalsh(link.inertia)
-        # No body has a moment above the sum of the other two.
-        if moments[2] > (moments[0] + moments[1]) * (1 + 1e-6):
+        # No body has a moment above the sum of the other two; and nothing is this heavy.
+        if moments[2] > (moments[0] + moments[1]) * (1 + 1e-6) or link.mass > MAX_MASS:
             return 0.0
         return float(min(link.mass, moments[0]))
 
-    value, name = _largest([(-smallest(link), link.name) for link in obj.links])
+    with np.errstate(all="ignore"):
+        value, name = _largest([(-smallest(link), link.name) for link in obj.links])
     return Verdict(
         rule="mass", value=-value, relation=">=", bar=1e-9, unit="kg or kg m^2", note=name
     )
 
 
 def _size(obj: ArticulatedObject, category: catalog.Category) -> Verdict:
-    """How far the rest extents lie outside the category's interval, as a factor."""
-    low, high = obj.rest_bounds
+    """How far the rest extents lie outside the category's interval, as a factor; stands apart."""
+    low, high = obj.body_bounds
     extents = high - low
     smallest, largest = category.size
     value = max(float(smallest / extents.min()), float(extents.max() / largest))
@@ -210,51 +232,53 @@ def _size(obj: ArticulatedObject, category: catalog.Category) -> Verdict:
 # -- shapes ------------------------------------------------------------------------------------
 
 
-def _signed_distance(points: Array, half_size: Array | None, cylinder: Any | None) -> Array:
-    """Distance (n,) of points (n, 3) from a box or a cylinder about x; negative inside, metres."""
-    if half_size is not None:
-        excess = np.abs(points) - half_size
-    else:
-        assert cylinder is not None
-        across = np.hypot(points[:, 1], points[:, 2])
-        excess = np.stack(
-            [np.abs(points[:, 0]) - cylinder.half_length, across - cylinder.radius], axis=1
-        )
-    outside = np.linalg.norm(np.maximum(excess, 0.0), axis=1)
-    return outside + np.minimum(excess.max(axis=1), 0.0)
+def _given_distance(given: Any, points: Array) -> Array:
+    """As ``distance.geometry_distance``, from a shape as the simulator holds it."""
+    if isinstance(given, physx.PhysxCollisionShapeConvexMesh):
+        return hull_distance(points, np.asarray(given.vertices, dtype=float))
+    if isinstance(given, physx.PhysxCollisionShapeBox):
+        return box_distance(points, np.asarray(given.half_size, dtype=float))
+    return cylinder_distance(points, given.radius, given.half_length)
 
 
-def _geometry_distance(geometry: Box | Cylinder, points: Array) -> Array:
-    if isinstance(geometry, Box):
-        return _signed_distance(points, np.asarray(geometry.half_size), None)
-    return _signed_distance(points, None, geometry)
-
-
-def _collision_shape(obj: ArticulatedObject) -> Verdict:
-    """How far what is seen lies from the surface of what the simulator was given."""
+def _collision_shape(obj: ArticulatedObject, grips: Sequence[_Grips]) -> Verdict:
+    """How far the simulator's shapes lie from the object's, and those from what is seen."""
+    gaps = [(0.0, "")]
     scene = ManipulationScene(obj, np.eye(4), obj.rest_positions)
-    gaps = []
     for link, body in zip(obj.links, scene.body.links, strict=True):
         if len(body.collision_shapes) != len(link.shapes):
             gaps.append((math.inf, f"{link.name}: {len(body.collision_shapes)} collision shapes"))
             continue
-        triangles, shape_index = link_triangles(link)
-        for i, given in enumerate(body.collision_shapes):
-            corners = triangles[shape_index == i].reshape(-1, 3)
-            seen = np.concatenate([corners, triangles[shape_index == i].mean(axis=1)])
+        pairs = zip(body.collision_shapes, _shape_triangles(link), strict=True)
+        for i, (given, triangles) in enumerate(pairs):
+            points = np.concatenate([triangles.reshape(-1, 3), triangles.mean(axis=1)])
             T_shape_link = transforms.invert(transform_from_pose(given.local_pose))
-            half_size = getattr(given, "half_size", None)
-            distance = _signed_distance(
-                transforms.apply(T_shape_link, seen),
-                half_size,
-                None if half_size is not None else given,
-            )
+            distance = _given_distance(given, transforms.apply(T_shape_link, points))
             gaps.append((float(np.abs(distance).max()), f"{link.name}, shape {i}"))
     scene.close()
+    for found in grips:
+        link = obj.links[found.part]
+        # The first points may lie anywhere, even inside.
+        allowed = np.flatnonzero(found.allowed[_GRIP_POINTS:]) + _GRIP_POINTS
+        if len(allowed):
+            distance = surface_distance(
+                link.shapes, found.points_part[allowed], found.normals_part[allowed]
+            )
+            gaps.append((float(distance.max()), f"{link.name}, what is seen"))
     value, note = _largest(gaps)
     return Verdict(
         rule="collision shape", value=value, relation="<=", bar=MAX_GAP, unit="m", note=note
     )
+
+
+def _shape_triangles(link: Link) -> list[Array]:
+    """Triangles (n, 3, 3) of each shape of a link, in the link's frame."""
+    return [
+        transforms.apply(
+            shape.T_link_shape, primitive_mesh(shape.geometry).triangles.reshape(-1, 3)
+        ).reshape(-1, 3, 3)
+        for shape in link.shapes
+    ]
 
 
 def _penetration(obj: ArticulatedObject) -> Verdict:
@@ -263,22 +287,35 @@ def _penetration(obj: ArticulatedObject) -> Verdict:
     worst = [(0.0, "")]
     for i, link in enumerate(obj.links):
         points = transforms.apply(Ts_object_link[i], grid_points(link, _SPACING))
-        for joint in obj.joints:
-            if joint.type == "revolute" and link.name in (joint.parent, joint.child):
-                arm = points - np.asarray(joint.pivot)
-                points = points[np.linalg.norm(np.cross(joint.axis, arm), axis=1) > HINGE_RADIUS]
         for k, other in enumerate(obj.links):
-            if k == i or not len(points):
+            if k == i:
                 continue
             points_other = transforms.apply(transforms.invert(Ts_object_link[k]), points)
+            inside = _within(points_other, other.bounds())
+            near = points_other[inside]
+            for joint in obj.joints:
+                if joint.type == "revolute" and link.name in (joint.parent, joint.child):
+                    arm = points[inside] - np.asarray(joint.pivot)
+                    distance = np.linalg.norm(np.cross(joint.axis, arm), axis=1)
+                    inside[inside] = distance > HINGE_RADIUS
+                    near = points_other[inside]
             for shape in other.shapes:
-                points_shape = transforms.apply(transforms.invert(shape.T_link_shape), points_other)
-                depth = -_geometry_distance(shape.geometry, points_shape).min()
+                corners = shape.corners_link()
+                inner = near[_within(near, np.stack([corners.min(axis=0), corners.max(axis=0)]))]
+                if not len(inner):
+                    continue
+                points_shape = transforms.apply(transforms.invert(shape.T_link_shape), inner)
+                depth = -geometry_distance(shape.geometry, points_shape).min()
                 worst.append((float(depth), f"{link.name} in {other.name}"))
     value, note = _largest(worst)
     return Verdict(
         rule="penetration", value=value, relation="<=", bar=MAX_PENETRATION, unit="m", note=note
     )
+
+
+def _within(points: Array, bounds: Array) -> NDArray[np.bool_]:
+    """Which points (n, 3) lie in an axis-aligned box (2, 3)."""
+    return np.all((points > bounds[0]) & (points < bounds[1]), axis=1)
 
 
 # -- motion ------------------------------------------------------------------------------------
@@ -290,9 +327,7 @@ class _FreeObject:
     def __init__(self, obj: ArticulatedObject, part: int, fraction: float) -> None:
         self._joint = obj.joint_of(part)
         self._part = part
-        q = obj.rest_positions.copy()
-        q[part - 1] = self._joint.position(fraction)
-        self._scene = ManipulationScene(obj, np.eye(4), q)
+        self._scene = ManipulationScene(obj, np.eye(4), obj.positions_with(part, fraction))
         self._lever = math.copysign(_lever(obj, part), self._joint.range)
 
     def __enter__(self) -> _FreeObject:
@@ -325,7 +360,7 @@ class _FreeObject:
             if force > 2 * HAND_FORCE:
                 return math.inf
             self.push(force)
-        return force
+        return force if math.isfinite(self.fraction()) else math.inf
 
     def push_until(self, force: float, fraction: float) -> float:
         """Pushes until an open fraction is passed or time is up; the fraction come to."""
@@ -347,13 +382,21 @@ def _lever(obj: ArticulatedObject, part: int) -> float:
 
 
 def _no_drift(obj: ArticulatedObject, category: catalog.Category) -> Verdict:
-    """The largest creep, as a share of the range, of a joint left alone anywhere in its range."""
+    """The largest creep, as a share of the range, of a joint left alone anywhere in its range.
+
+    All joints are left at the same open fraction; they do not touch each other.
+    """
     drifts = []
-    for part, joint in enumerate(obj.joints, start=1):
-        for fraction in (0.0, *category.start_fraction, 0.5, 1.0):
-            with _FreeObject(obj, part, fraction) as free:
-                free.rest(REST_TIME)
-                drifts.append((abs(free.fraction() - fraction), f"{joint.name} at {fraction:.2f}"))
+    for fraction in (0.0, *category.start_fraction, 0.5, 1.0):
+        q = np.array([joint.position(fraction) for joint in obj.joints])
+        scene = ManipulationScene(obj, np.eye(4), q)
+        scene.step(round(REST_TIME / scene.config.timestep))
+        creep = np.abs(scene.body.positions() - q)
+        scene.close()
+        drifts += [
+            (float(c / abs(joint.range)), f"{joint.name} at {fraction:.2f}")
+            for c, joint in zip(creep, obj.joints, strict=True)
+        ]
     value, note = _largest(drifts)
     return Verdict(
         rule="no drift", value=value, relation="<=", bar=MAX_DRIFT, unit="of the range", note=note
@@ -410,46 +453,62 @@ def _stays_put(obj: ArticulatedObject) -> Verdict:
 # -- gripper -----------------------------------------------------------------------------------
 
 
-def _graspable(obj: ArticulatedObject, category: catalog.Category, judge: GraspJudge) -> Verdict:
-    """How many candidate grasps of a part geometry allows at the start, the least of all parts."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Grips:
+    """Where geometry allows a part to be gripped at the start of an episode.
+
+    Attributes:
+        part: index of the part.
+        points_part, normals_part: (n, 3) surface points of what is seen and outward normals.
+        allowed: (n,) whether any grasp is possible there.
+        grasps: how many are, at the first ``_GRIP_POINTS`` points.
+        tried: of how many.
+    """
+
+    part: int
+    points_part: Array
+    normals_part: Array
+    allowed: NDArray[np.bool_]
+    grasps: int
+    tried: int
+
+
+def _grips(obj: ArticulatedObject, category: catalog.Category, judge: GraspJudge) -> list[_Grips]:
+    """Candidate grasps of each movable part, judged."""
     rng = np.random.default_rng(0)
-    counts = []
-    for part, joint in enumerate(obj.joints, start=1):
-        q = obj.rest_positions.copy()
-        q[part - 1] = joint.position(float(np.mean(category.start_fraction)))
+    found = []
+    for part in range(1, obj.num_parts):
+        link = obj.links[part]
+        q = obj.positions_with(part, float(np.mean(category.start_fraction)))
         T_object_part = obj.link_poses(q)[part]
-        points_part, normals_part = _random_surface(obj.links[part], _GRIP_POINTS, rng)
-        normals = transforms.rotate(T_object_part, normals_part)
+        points, normals = surface_points(link, _GRIP_POINTS, rng)
+        if link.visuals:
+            # What is seen is compared with what collides, and wants more points.
+            more = uncovered_points(link, _SEEN_POINTS, np.random.default_rng(0))
+            points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])
         verdicts = judge(
             obj,
             q,
             part,
-            transforms.apply(T_object_part, points_part),
-            candidate_rotations(normals),
+            transforms.apply(T_object_part, points),
+            candidate_rotations(transforms.rotate(T_object_part, normals)),
         )
-        counts.append((-float((verdicts == 0).sum()), f"{obj.links[part].name}, {verdicts.size}"))
-    value, note = _largest(counts)
-    return Verdict(
-        rule="graspable",
-        value=-value,
-        relation=">=",
-        bar=1.0,
-        unit="grasps",
-        note=f"{note} tried",
+        found.append(
+            _Grips(
+                part=part,
+                points_part=points,
+                normals_part=normals,
+                allowed=(verdicts == 0).any(axis=1),
+                grasps=int((verdicts[:_GRIP_POINTS] == 0).sum()),
+                tried=verdicts[:_GRIP_POINTS].size,
+            )
+        )
+    return found
+
+
+def _graspable(obj: ArticulatedObject, grips: Sequence[_Grips]) -> Verdict:
+    """How many candidate grasps of a part geometry allows at the start, the least of all parts."""
+    value, note = _largest(
+        [(-float(g.grasps), f"{obj.links[g.part].name}, {g.tried} tried") for g in grips]
     )
-
-
-def _random_surface(link: Link, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Points (count, 3) on a link's surface and outward normals, link frame.
-
-    A shape's share goes with the square root of its area: handles are small.
-    """
-    triangles, shape_index = link_triangles(link)
-    a, b, c = np.swapaxes(triangles, 0, 1)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    weight = area / np.sqrt(np.bincount(shape_index, area))[shape_index]
-    chosen = rng.choice(len(triangles), count, p=weight / weight.sum())
-    u, v = rng.random((2, count, 1))
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    points = a[chosen] + u * (b - a)[chosen] + v * (c - a)[chosen]
-    return points, link_body(link).normals()[chosen]
+    return Verdict(rule="graspable", value=-value, relation=">=", bar=1.0, unit="grasps", note=note)

@@ -15,6 +15,7 @@ import pytest
 from artgym.annotation.annotate import (
     AnnotationConfig,
     annotate_split,
+    labelled_categories,
     labelled_ids,
     labels_folder,
     read_labels,
@@ -67,7 +68,7 @@ def test_bits_are_the_outcomes_of_trials(finished):
     for object_id in labelled_ids("drawer", "val", finished):
         labels, obj = read_labels(object_id, finished), catalog.load(object_id)
         for state, point, candidate in np.argwhere(labels.success)[:2]:
-            q = [obj.joints[0].position(labels.fractions[state])]
+            q = obj.positions_with(1, labels.fractions[state])
             T_object_grasp = tried_grasp(labels, obj, state, point, candidate)
             assert try_grasp(obj, q, 1, T_object_grasp).success
             tried += 1
@@ -81,7 +82,7 @@ def test_shipped_bits_are_the_outcomes_of_trials(category):
     for object_id in labelled_ids(category, "test")[:5]:
         labels, obj = read_labels(object_id), catalog.load(object_id)
         for state, point, candidate in rng.choice(np.argwhere(labels.success), 6):
-            q = [obj.joints[0].position(labels.fractions[state])]
+            q = obj.positions_with(1, labels.fractions[state])
             T_object_grasp = tried_grasp(labels, obj, state, point, candidate)
             held.append(try_grasp(obj, q, 1, T_object_grasp).success)
     # The points are kept in single precision: a try on the brink may end otherwise.
@@ -90,8 +91,7 @@ def test_shipped_bits_are_the_outcomes_of_trials(category):
 
 def tried_grasp(labels, obj, state, point, candidate):
     """``T_object_grasp`` of one try, from what the file keeps."""
-    joint = obj.joints[0]
-    T_object_part = obj.link_poses([joint.position(labels.fractions[state])])[1]
+    T_object_part = obj.link_poses(obj.positions_with(1, labels.fractions[state]))[1]
     R = candidates_of_part(labels.normals_part[state, point], T_object_part[:3, :3])[candidate]
     point_object = transforms.apply(T_object_part, labels.points_part[state, point][None])[0]
     return transforms.transform_from(R, point_object)
@@ -146,7 +146,7 @@ def test_an_object_without_labels(tmp_path):
 
 
 def test_shipped_labels_are_read():
-    shipped = [i for c in catalog.CATEGORIES for i in labelled_ids(c, "train")]
+    shipped = [i for c in labelled_categories() for i in labelled_ids(c, "train")]
     if not shipped:
         pytest.skip("no labels are shipped with this tree")
     labels = read_labels(shipped[0])

@@ -12,6 +12,7 @@ FAILURE = EpisodeRecord(
     policy="zero",
     category="drawer",
     object_id="drawer/1200",
+    part=1,
     episode=0,
     seed=1,
     success=False,

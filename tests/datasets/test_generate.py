@@ -34,7 +34,7 @@ from artgym.objects.model import canonical_box
 
 FRACTIONS = np.array([0.05, 0.4])
 CONFIG = GenerationConfig(views=2, camera_size=(160, 120), max_points=1500, min_points=200)
-IDS = ("drawer/1000", "laptop/1000")
+IDS = ("drawer/1001", "laptop/1000")
 
 pytestmark = pytest.mark.usefixtures("render_system")
 
@@ -42,9 +42,9 @@ pytestmark = pytest.mark.usefixtures("render_system")
 def write_labels(object_id: str, root: Path) -> None:
     """Labels with real points and random outcomes; the first half of the points has none."""
     obj, rng = catalog.load(object_id), np.random.default_rng(1)
-    joint, rows = obj.joint_of(MOVABLE_PART), []
+    rows: list[tuple[np.ndarray, ...]] = []
     for fraction in FRACTIONS:
-        q = np.array([joint.position(fraction)])
+        q = obj.positions_with(MOVABLE_PART, fraction)
         points, normals = visible_points(obj, q, MOVABLE_PART, 150, 4, 0.35, rng)
         T_part_object = transforms.invert(obj.link_poses(q)[MOVABLE_PART])
         success = rng.random((150, NUM_CANDIDATES)) < 0.2
@@ -75,7 +75,7 @@ def write_labels(object_id: str, root: Path) -> None:
 @pytest.fixture(scope="module")
 def labels(tmp_path_factory):
     root = tmp_path_factory.mktemp("labels")
-    for object_id in (*IDS, "drawer/1001"):
+    for object_id in (*IDS, "drawer/1002"):
         write_labels(object_id, root)
     return root
 
@@ -178,9 +178,9 @@ def test_same_bytes_however_made(labels, tmp_path):
     generate_split("drawer", "val", tmp_path / "a", **kwargs)
     generate_split("drawer", "val", tmp_path / "b", workers=2, **kwargs)
     made = files(tmp_path / "a")
-    assert set(made) == {"drawer_1000.h5", "drawer_1001.h5", "manifest.json"}
+    assert set(made) == {"drawer_1001.h5", "drawer_1002.h5", "manifest.json"}
     assert files(tmp_path / "b") == made
-    (tmp_path / "a" / "drawer_1001.h5").unlink()
+    (tmp_path / "a" / "drawer_1002.h5").unlink()
     generate_split("drawer", "val", tmp_path / "a", **kwargs)
     assert files(tmp_path / "a") == made
 
@@ -200,6 +200,6 @@ def test_command_line(labels, tmp_path, capsys):
 def test_without_labels(tmp_path):
     with pytest.raises(InvalidArgumentError, match="artgym annotate --category drawer"):
         generate_split("drawer", "val", tmp_path / "out", label_root=tmp_path)
-    with pytest.raises(DamagedFileError, match="drawer_1000"):
-        make_samples("drawer/1000", CONFIG, tmp_path)
+    with pytest.raises(DamagedFileError, match="drawer_1001"):
+        make_samples("drawer/1001", CONFIG, tmp_path)
     assert not (tmp_path / "out").exists()

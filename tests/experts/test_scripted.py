@@ -29,7 +29,7 @@ def run(object_id: str, seed: int):
     return info, np.array(actions)
 
 
-@pytest.mark.parametrize("number", [2, 1201])
+@pytest.mark.parametrize("number", [2])
 @pytest.mark.parametrize("category", list(catalog.CATEGORIES))
 def test_it_succeeds(category, number):
     info, _ = run(f"{category}/{number:04d}", seed=number)

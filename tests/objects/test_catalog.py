@@ -35,7 +35,8 @@ def test_same_id_same_object_in_a_fresh_process():
 
 @pytest.mark.parametrize("category", CATEGORIES)
 def test_splits_are_disjoint_and_objects_differ(category):
-    ids = {split: set(catalog.object_ids(category, split)) for split in catalog.SPLITS}
+    splits = [s for s in catalog.SPLITS if category in catalog.categories_with(s)]
+    ids = {split: set(catalog.object_ids(category, split)) for split in splits}
     together = set().union(*ids.values())
     assert len(together) == sum(map(len, ids.values()))
     assert all(catalog.split_of(i) == split for split in ids for i in ids[split])
@@ -55,11 +56,32 @@ def test_start_states_are_nearly_closed():
 
 @pytest.mark.parametrize("category", CATEGORIES)
 def test_parts_are_the_category_s(category):
-    for object_id in catalog.object_ids(category, "train", 10):
+    parts = catalog.category(category).parts
+    for object_id in catalog.all_ids(category, 10):
         obj = catalog.load(object_id)
         assert obj.object_id == object_id
         assert obj.category == category
-        assert obj.part_names == catalog.category(category).parts
+        assert 2 <= obj.num_parts <= len(parts)
+        assert obj.part_names == parts[: obj.num_parts]
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_every_part_occurs(category):
+    objects = [catalog.load(i) for i in catalog.all_ids(category, 40)]
+    assert max(obj.num_parts for obj in objects) == len(catalog.category(category).parts)
+
+
+def test_held_out_categories_are_for_tests_alone():
+    held_out = [c.name for c in catalog.CATEGORIES.values() if c.held_out]
+    assert len(held_out) == 4
+    assert set(catalog.categories_with("test")) == set(CATEGORIES)
+    assert set(catalog.categories_with("train")) == set(CATEGORIES) - set(held_out)
+    for category in held_out:
+        assert {catalog.split_of(i) for i in catalog.all_ids(category)} == {"test"}
+        assert catalog.object_ids(category, "test") == catalog.all_ids(category)
+        for split in ("train", "val"):
+            with pytest.raises(InvalidArgumentError, match="held out"):
+                catalog.object_ids(category, split)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +118,7 @@ def test_unknown_category_split_and_count():
 
 @pytest.mark.parametrize("category", CATEGORIES)
 def test_variety(category):
-    objects = [catalog.load(i) for i in catalog.object_ids(category, "train", 60)]
-    assert len({o.attributes["family"] for o in objects}) == 3
+    objects = [catalog.load(i) for i in catalog.all_ids(category, 60)]
+    assert len({o.attributes["family"] for o in objects}) >= 3
     colors = {s.material.color for o in objects for link in o.links for s in link.shapes}
     assert len(colors) > 60

@@ -15,7 +15,7 @@ from artgym.sim.camera import RenderedCamera, View, ViewDistribution
 from artgym.sim.scene import TABLE_HALF_SIZE, ManipulationScene
 from artgym.sim.setting import add_lights
 
-IDS = ["drawer/0001", "drawer/0007", "laptop/0001", "laptop/0002"]
+IDS = ["drawer/0004", "drawer/0007", "laptop/0001", "laptop/0002"]
 ABOVE = transforms.transform_from(np.diag([1.0, -1.0, -1.0]), [0.15, 0.1, 0.55])
 
 
@@ -60,7 +60,7 @@ def test_depth_is_the_renderer_s(object_id, render_system):
 
 
 def test_rays_against_a_box_by_hand():
-    obj = catalog.load("drawer/0000")
+    obj = catalog.load("drawer/0003")
     top = obj.rest_bounds[1, 2]
     view = View(
         T_world_camera=look_at([0.0, 0.0, top + 1.0], [0.0, 0.0, 0.0], up_world=[1.0, 0.0, 0.0]),
