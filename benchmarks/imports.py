@@ -197,7 +197,7 @@ def measure(config: ImportsConfig) -> dict[str, Any]:
         }
     successes = sum(e["success"] for e in episodes)
     result = {
-        "config": {**asdict(config), "folder": config.folder.name},
+        "config": {"folder": config.folder.name, "seeds": config.seeds, "workers": config.workers},
         "objects": {
             file.relative_to(config.folder).as_posix(): row
             for file, row in zip(files, rows, strict=True)

@@ -1,4 +1,4 @@
-"""What all tests share: one thread a process, and the renderer or a reason to skip."""
+"""What all tests share: one thread a process, own folders, the renderer or a reason to skip."""
 
 from __future__ import annotations
 
@@ -14,7 +14,19 @@ import pytest  # noqa: E402
 from artgym.errors import RendererUnavailableError  # noqa: E402
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import sapien
+
+
+@pytest.fixture(autouse=True, scope="session")
+def own_folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test sees or leaves anything in the caller's caches and imported objects."""
+    folder = tmp_path_factory.mktemp("artgym")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ARTGYM_CACHE", str(folder / "cache"))
+        patch.setenv("ARTGYM_OBJECTS", str(folder / "objects"))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -546,6 +546,8 @@ def _capped(vertices: Array, faces: Faces) -> tuple[Array, Faces] | None:
     if crowded:
         bad = [any((int(a), int(b)) in crowded for a, b in of_face) for of_face in corners]
         faces = faces[~np.array(bad)]
+        if not len(faces):
+            return None
     border = _directed_border(faces)
     if border is None or not len(border):
         return None if border is None else (vertices, faces)

@@ -159,9 +159,9 @@ def _draw_form(rng: np.random.Generator, family: str, wire: bool) -> _Form:
     half_height = min(uniform(rng, _ASPECT[family]) * half_lens, 0.026)
     thickness = uniform(rng, (0.0018, 0.0026) if wire else (0.0026, 0.0040))
     root = uniform(rng, (0.003, 0.005) if wire else (0.005, 0.009))
-    # One behind the other with 1.5 mm between.
+    # One behind the other with 2 mm between.
     near = -0.0022 - thickness / 2
-    far = near - thickness - 0.0015
+    far = near - thickness - 0.0020
     height = uniform(rng, _HINGE_HEIGHT) * half_height
     tip = uniform(rng, (0.003, 0.0045) if wire else (0.004, 0.006))
     # Temple_1 passes over temple_2.
@@ -171,7 +171,7 @@ def _draw_form(rng: np.random.Generator, family: str, wire: bool) -> _Form:
         lens_y=bridge / 2 + rim + half_lens,
         lens=(half_lens, half_height),
         rim=rim,
-        depth=uniform(rng, (0.0020, 0.0030) if wire else (0.0030, 0.0045)),
+        depth=uniform(rng, (0.0025, 0.0034) if wire else (0.0030, 0.0045)),
         hinges=(
             (near, half_width - inset, height + apart),
             (far, half_width - inset, height - apart),
