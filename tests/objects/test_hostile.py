@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -12,8 +13,10 @@ from typing import Any
 
 import pytest
 
+from artgym.errors import MissingDependencyError
 from artgym.objects.collision import CACHE_VARIABLE
-from tests.hostile.corpus import CASES, HostileCase
+from artgym.objects.importing import import_object
+from tests.hostile.corpus import CASES, GOOD_OBJ, GOOD_URDF, HostileCase
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Processor seconds in which a file must be refused.
@@ -95,3 +98,30 @@ def test_nothing_outside_is_touched(
     # Our own cache of convex pieces is the one thing that may be written.
     allowed = (f"{asset}/", f"{root}/cache/")
     assert [path for path in record["opened"] if not path.startswith(allowed)] == []
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        # One corner pulled out: the extreme points of the hull lie in one plane.
+        GOOD_OBJ.replace(b"v 0.0 0.3 0.3", b"v -1 0.3 0.3"),
+        # Corners repeated before the others: every face has an edge with a third one.
+        GOOD_OBJ.replace(
+            b"v 0.02 0.0 0.0",
+            b"v 0.0 0.3 0.0\nv 0.0 0.3 0.3\nv 0.02 0.0 0.0\n" * 2 + b"v 0.02 0.0 0.0",
+            1,
+        ),
+    ],
+    ids=["flat start", "crowded edges"],
+)
+def test_awkward_meshes_that_raised_something_else(
+    spoilt: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setitem(sys.modules, "coacd", None)
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "door.obj").write_bytes(spoilt)
+    (tmp_path / "object.urdf").write_text(GOOD_URDF)
+    # Either there are pieces, or the mesh must be taken apart by what is not there.
+    with contextlib.suppress(MissingDependencyError):
+        assert import_object(tmp_path / "object.urdf").object.links[1].shapes
