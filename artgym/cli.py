@@ -36,13 +36,20 @@ def doctor(*, json: bool = False) -> int:
     return 0 if findings.is_healthy() else 1
 
 
-def objects(*, category: str | None = None, split: str = "train", count: int | None = None) -> int:
+def objects(
+    *,
+    category: str | None = None,
+    split: str = "train",
+    count: int | None = None,
+    pictures: Path | None = None,
+) -> int:
     """List the objects of the catalogue, one a line.
 
     Args:
         category: only this one, or import for what was imported here; by default all categories.
         split: train, val or test.
         count: the first so many of each category; by default all.
+        pictures: folder that gets a picture of each.
     """
     from artgym.objects import catalog
 
@@ -53,9 +60,11 @@ def objects(*, category: str | None = None, split: str = "train", count: int | N
             for j in obj.joints
         ]
         kind = [f"{name}={value}" for name, value in sorted(obj.attributes.items())]
-        low, high = obj.rest_bounds
+        low, high = obj.body_bounds
         extents = "x".join(f"{extent:.2f}" for extent in high - low)
         print(f"{object_id}  {extents} m  {', '.join(joints)}  {' '.join(kind)}")
+        if pictures is not None:
+            _take_picture(obj, pictures)
     return 0
 
 

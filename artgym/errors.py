@@ -76,12 +76,17 @@ class AssetError(ArtgymError, ValueError):
         place = f"{element}: " if element else ""
         super().__init__(f"{file}: {place}{problem}{shown}. {remedy}")
         self.file = str(file)
+        self.problem = problem
         self.element = element
         self.value = value
         self.remedy = remedy
 
     def __reduce__(self) -> tuple[object, ...]:
-        return (InvalidArgumentError, (str(self),))
+        return (_asset_error, (self.file, self.problem, self.remedy, self.element, self.value))
+
+
+def _asset_error(file: str, problem: str, remedy: str, element: str, value: object) -> AssetError:
+    return AssetError(file, problem, remedy=remedy, element=element, value=value)
 
 
 class FileNotWrittenError(ArtgymError, OSError):

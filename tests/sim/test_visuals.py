@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import imageio.v3 as iio
 import numpy as np
 import pytest
 import sapien
 
+from artgym import cli
 from artgym.geometry.camera import look_at
 from artgym.objects import catalog
 from artgym.objects.contents import Image, TriangleMesh
@@ -204,3 +206,12 @@ def test_light_is_neither_dark_nor_blinding(render_system):
     assert min(brightness) > 60
     assert max(brightness) < 250
     assert np.ptp(brightness) > 50
+
+
+def test_objects_are_listed_with_pictures(render_system, tmp_path, capsys):
+    command = ["objects", "--category", "stapler", "--count", "2", "--pictures", str(tmp_path)]
+    assert cli.main(command) == 0
+    printed = capsys.readouterr().out
+    for name in ("stapler_0000.png", "stapler_0001.png"):
+        assert name in printed
+        assert iio.imread(tmp_path / name).std() > 5

@@ -122,7 +122,7 @@ def make_faucet(object_id: str, rng: np.random.Generator) -> ArticulatedObject:
                 pivot=_vector(np.asarray(lever.pivot) + move),
                 closed=0.0,
                 open=float(lever.range),
-                friction=hold * uniform(rng, (1.3, 1.6)) + uniform(rng, (0.02, 0.15)),
+                friction=float(hold) * uniform(rng, (1.3, 1.6)) + uniform(rng, (0.02, 0.15)),
                 damping=uniform(rng, (0.002, 0.01)),
             ),
             Joint(
