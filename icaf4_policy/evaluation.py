@@ -69,10 +69,20 @@ def _part_metrics(prediction: Prediction, sample: Sample) -> dict[str, float]:
     ious = metrics.class_ious(prediction.part, true_part, sample.num_parts)
     row = {"part_miou": float(np.nanmean(ious))}
     visible = np.bincount(true_part, minlength=sample.num_parts) >= MIN_PART_POINTS
-    found = [box is not None for box in prediction.part_boxes]
+    # Parts of an object that the network was not trained to tell apart count as not found.
+    part_boxes = _boxes_of_parts(prediction.part_boxes, sample.num_parts)
+    object_boxes = _boxes_of_parts(prediction.object_boxes, sample.num_parts)
+    found = [box is not None for box in part_boxes]
     row["parts_found"] = float(np.mean(np.array(found)[visible])) if visible.any() else np.nan
-    row |= _box_metrics("part", prediction.part_boxes, true_part_boxes(sample), visible)
-    return row | _box_metrics("object", prediction.object_boxes, true_object_boxes(sample), visible)
+    row |= _box_metrics("part", part_boxes, true_part_boxes(sample), visible)
+    return row | _box_metrics("object", object_boxes, true_object_boxes(sample), visible)
+
+
+def _boxes_of_parts(
+    boxes: tuple[PoseFit | None, ...], num_parts: int
+) -> tuple[PoseFit | None, ...]:
+    """The boxes of a network of other parts, as those of an object of ``num_parts``."""
+    return (*boxes, *(None,) * num_parts)[:num_parts]
 
 
 def _box_metrics(
@@ -99,9 +109,9 @@ def _box_metrics(
 def _joint_metrics(prediction: Prediction, sample: Sample) -> dict[str, float]:
     rows = []
     for k in np.flatnonzero(sample.joint_type != JOINT_NONE):
-        joint = prediction.joints[k]
-        if prediction.part_boxes[k] is None:
+        if k >= len(prediction.joints) or prediction.part_boxes[k] is None:
             continue
+        joint = prediction.joints[k]
         angle, distance = metrics.axis_errors(
             joint.axis_camera,
             joint.pivot_camera,
