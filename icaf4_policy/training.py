@@ -118,11 +118,19 @@ def prepare(
         samples: decoded one at a time if they are lazy.
         config: of the training.
         label: what the progress bar says.
+
+    Raises:
+        InvalidArgumentError: a sample of another category.
     """
     anchors = axis_anchors(config.anchor_step_deg)
     digest = hashlib.sha256()
     prepared = []
     for sample in tqdm(samples, desc=label, unit="sample", leave=False, disable=None):
+        if sample.object_id.partition("/")[0] != config.category:
+            raise InvalidArgumentError(
+                f"a sample of {sample.object_id!r} among those of {config.category!r}: train each "
+                "category on its own samples."
+            )
         digest.update(sample.object_id.encode())
         digest.update(np.ascontiguousarray(sample.points_camera).tobytes())
         digest.update(np.ascontiguousarray(sample.grasp_bits).tobytes())
@@ -131,16 +139,11 @@ def prepare(
 
 
 def _model_config(config: TrainingConfig, targets: Sequence[Targets]) -> ModelConfig:
-    parts = {len(t.joint_type) for t in targets}
-    if len(parts) != 1:
-        raise InvalidArgumentError(
-            f"samples of {config.category!r} have {sorted(parts)} parts: expected one number. "
-            "Train each category on its own samples."
-        )
     diagonals = [np.linalg.norm(np.ptp(t.points_level, axis=0)) for t in targets]
     return ModelConfig(
         category=config.category,
-        num_parts=parts.pop(),
+        # Objects have the first so many of their category's parts.
+        num_parts=max(len(t.joint_type) for t in targets),
         length_unit=round(float(np.median(diagonals)) / 2.0, 3),
         num_points=config.num_points,
         anchor_step_deg=config.anchor_step_deg,

@@ -177,3 +177,25 @@ def test_unreadable_description_is_named(saved):
     description_path(weights).write_bytes(b"\xff{")
     with pytest.raises(DamagedFileError, match=r"toy\.json"):
         load_model(weights)
+
+
+def test_objects_may_have_fewer_parts_than_their_category(tmp_path, samples):
+    one = samples[0][0]
+    arrays = {
+        name: getattr(one, name)
+        for name in (
+            *("part_centers", "part_scales", "joint_type", "joint_axis_camera"),
+            *("joint_pivot_camera", "open_fraction", "T_camera_parts", "T_object_rest_parts"),
+        )
+    }
+    wider = {name: np.concatenate([array, array[-1:]]) for name, array in arrays.items()}
+    mixed = [one, dataclasses.replace(one, **wider)]
+    path = tmp_path / "mixed.safetensors"
+    model = train(dataclasses.replace(CONFIG, epochs=1), mixed, samples[1], path)
+    assert model.config.num_parts == 3
+
+
+def test_a_sample_of_another_category_is_refused(tmp_path, samples):
+    stray = dataclasses.replace(samples[0][0], object_id="mug/0001")
+    with pytest.raises(InvalidArgumentError, match=r"mug/0001.*toy"):
+        train(CONFIG, [stray], samples[1], tmp_path / "weights.safetensors")
