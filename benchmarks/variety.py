@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 from rich.table import Table
 from scipy.spatial import cKDTree
@@ -138,18 +139,20 @@ def shape_distances(objects: Sequence[ArticulatedObject]) -> Array:
 def _extents(obj: ArticulatedObject, fraction: float) -> dict[str, Array]:
     """Sorted extents (3,) of the whole and of each part, stands apart, metres.
 
-    Parts are measured along the object's axes as they stand at an open fraction of all joints.
+    Parts are measured as they stand at an open fraction of all joints, along the axes of the
+    smallest box around the first part: objects on stands may be tilted.
     """
     Ts = obj.link_poses([joint.position(fraction) for joint in obj.joints])
-    lows, highs, extents = [], [], {}
-    for part, (T, link) in enumerate(zip(Ts, obj.links, strict=True)):
-        corners = np.concatenate([s.corners_link() for s in link.shapes if s.role != "stand"])
-        moved = transforms.apply(T, corners)
-        lows.append(moved.min(axis=0))
-        highs.append(moved.max(axis=0))
-        extents[str(part)] = np.sort(highs[-1] - lows[-1])
-    extents["whole"] = np.sort(np.max(highs, axis=0) - np.min(lows, axis=0))
-    return extents
+    corners = [
+        transforms.apply(
+            T, np.concatenate([s.corners_link() for s in link.shapes if s.role != "stand"])
+        )
+        for T, link in zip(Ts, obj.links, strict=True)
+    ]
+    T_box_object, _ = trimesh.bounds.oriented_bounds(corners[0])
+    corners = [transforms.apply(T_box_object, points) for points in corners]
+    extents = {str(part): np.sort(np.ptp(points, axis=0)) for part, points in enumerate(corners)}
+    return extents | {"whole": np.sort(np.ptp(np.concatenate(corners), axis=0))}
 
 
 def real_sizes() -> list[dict[str, Any]]:

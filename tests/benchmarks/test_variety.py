@@ -53,3 +53,12 @@ def test_a_real_object_beyond_the_range_is_named(size, outside):
 
 def test_a_part_that_is_never_made_is_outside():
     assert list(variety._outside({"2": np.ones(3)}, {})) == ["2"]
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_tilted_objects_are_measured_along_their_own_axes(number):
+    extents = variety._extents(catalog.load(f"cutter/{number:04d}"), 0.0)
+    thickness, width, length = extents["0"]
+    assert thickness < 0.03
+    assert width < 0.045
+    assert 0.09 < length < 0.18
