@@ -96,7 +96,7 @@ def _cpu_model() -> str:
 
 
 def write_result(path: Path, result: dict[str, Any]) -> None:
-    """Writes a result as JSON, whole; paths become text and NaN null.
+    """Writes a result as JSON, whole; NaN becomes null, a path text from the repository's root.
 
     Raises:
         FileNotWrittenError: the system refused.
@@ -133,5 +133,6 @@ def _json_value(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Path):
-        return str(value)
+        inside = value.is_relative_to(_REPOSITORY)
+        return (value.relative_to(_REPOSITORY) if inside else value).as_posix()
     return value

@@ -444,7 +444,6 @@ class _ArraysFile:
             raise self._error(name, "is missing") from error
         except (
             EOFError,
-            NotImplementedError,
             OSError,
             OverflowError,
             RuntimeError,

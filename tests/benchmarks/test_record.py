@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from benchmarks.record import provenance, write_result
+from benchmarks.record import RESULTS_FOLDER, provenance, write_result
 
 
 def test_result_is_plain_json(tmp_path):
@@ -18,6 +18,12 @@ def test_result_is_plain_json(tmp_path):
     assert result["rows"] == [{"a": 1}] * 200
     # A row a line.
     assert path.read_text().count("\n") > 200
+
+
+def test_paths_in_the_repository_are_told_from_its_root(tmp_path):
+    write_result(tmp_path / "result.json", {"out": RESULTS_FOLDER, "elsewhere": tmp_path})
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result == {"out": "benchmarks/results", "elsewhere": tmp_path.as_posix()}
 
 
 def test_provenance_names_command_and_commit(monkeypatch):

@@ -335,7 +335,7 @@ def _case(rng: np.random.Generator) -> _Parts:
     handle = str(rng.choice(("lip", "tab", "knob"), p=(0.4, 0.4, 0.2)))
     scale = 1.0 if rng.random() < 0.6 else uniform(rng, (1.0, 1.5))
     x, y = scale * uniform(rng, (0.034, 0.0485)), scale * uniform(rng, (0.095, 0.126))
-    height = scale * uniform(rng, (0.022, 0.0395))
+    height = scale * uniform(rng, (0.018, 0.0395))
     # Open, the lid lies beside the body and must not reach the table.
     thickness = min(scale * uniform(rng, (0.005, 0.026)), height - 0.004)
     wall = 0.0025

@@ -721,15 +721,15 @@ def _support(
 
 
 def _organiser(object_id: str, rng: np.random.Generator) -> ArticulatedObject:
-    """A box for a desk's top, 7-36 cm wide, 9-31 cm deep, 6-27 cm high."""
+    """A box for a desk's top, 7-36 cm wide, 6-31 cm deep, 6-27 cm high."""
     count = int(rng.choice((1, 2, 3), p=(0.4, 0.2, 0.4)))
     handle = str(
         rng.choice(("knob", "bar", "ledge", "edge", "notch"), p=(0.25, 0.2, 0.2, 0.2, 0.15))
     )
     kind = str(rng.choice(("plastic", "wood", "metal"), p=(0.55, 0.3, 0.15)))
     inset = bool(rng.random() < 0.7)
-    width = uniform(rng, (0.070, 0.24)) if count > 1 else uniform(rng, (0.085, 0.36))
-    depth = uniform(rng, (0.09, 0.31))
+    width = uniform(rng, (0.070, 0.24)) if count > 1 else uniform(rng, (0.070, 0.36))
+    depth = uniform(rng, (0.065, 0.31))
     bay = uniform(rng, (0.039, 0.077)) if count > 1 else uniform(rng, (0.057, 0.095))
     wall = uniform(rng, (0.002, 0.005)) if kind != "wood" else uniform(rng, (0.005, 0.009))
     feet = uniform(rng, (0.001, 0.006))

@@ -55,9 +55,9 @@ _BLADE_SHARE = {
 #: Width of a ring over all, and length over width.
 _RING_WIDTH = {
     "office": (0.024, 0.036),
-    "kitchen": (0.032, 0.042),
+    "kitchen": (0.032, 0.047),
     "child": (0.024, 0.032),
-    "tailor": (0.030, 0.040),
+    "tailor": (0.030, 0.044),
     "steel": (0.024, 0.034),
 }
 _RING_ASPECT = {
