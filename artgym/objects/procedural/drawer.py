@@ -731,6 +731,9 @@ def _organiser(object_id: str, rng: np.random.Generator) -> ArticulatedObject:
     width = uniform(rng, (0.070, 0.24)) if count > 1 else uniform(rng, (0.070, 0.36))
     depth = uniform(rng, (0.065, 0.31))
     bay = uniform(rng, (0.039, 0.077)) if count > 1 else uniform(rng, (0.057, 0.095))
+    if handle == "notch":
+        # A finger must fit through it, and the hand in front of it.
+        width, bay = max(width, 0.11), max(bay, 0.05)
     wall = uniform(rng, (0.002, 0.005)) if kind != "wood" else uniform(rng, (0.005, 0.009))
     feet = uniform(rng, (0.001, 0.006))
     height = feet + 2 * wall + count * bay + (count - 1) * wall
