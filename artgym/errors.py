@@ -97,5 +97,9 @@ class MissingDependencyError(ArtgymError, ImportError):
     """A package or system library is missing; the message says how to install it."""
 
 
+class WorkerError(ArtgymError, RuntimeError):
+    """A process that steps environments died, hangs, or met an unexpected error."""
+
+
 class NotReadyError(ArtgymError, RuntimeError):
     """A call came at the wrong time: before ``reset`` or after ``close``."""

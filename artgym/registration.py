@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import gymnasium
+
+from artgym.objects.categories import CATEGORIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,33 +18,56 @@ class EnvironmentEntry:
     Args:
         id: what `gymnasium.make` is given; a change of behaviour means a new version in it.
         entry_point: "module:Class", imported only when an environment is made.
-        horizon: control steps after which an episode is truncated.
+        vector_entry_point: the same for `gymnasium.make_vec`.
+        arguments: what the class is given unless the caller says otherwise.
         tags: what a test or a benchmark selects environments by.
     """
 
     id: str
     entry_point: str
-    horizon: int
+    vector_entry_point: str
+    arguments: Mapping[str, Any] = field(default_factory=dict)
     tags: frozenset[str] = frozenset()
 
 
+def _entry(
+    task: str, module: str, word: str = "", tags: tuple[str, ...] = (), **arguments: Any
+) -> EnvironmentEntry:
+    return EnvironmentEntry(
+        id=f"Art{task}{word}-v0",
+        entry_point=f"artgym.envs.{module}:Art{task}Env",
+        vector_entry_point=f"artgym.envs.vector:make_{task.lower()}",
+        arguments=arguments,
+        tags=frozenset({task.lower(), *tags}),
+    )
+
+
 ENVIRONMENTS: tuple[EnvironmentEntry, ...] = (
-    EnvironmentEntry(
-        id="ArtOpen-v0",
-        entry_point="artgym.envs.articulated_env:ArtOpenEnv",
-        horizon=300,
-        tags=frozenset({"single-object", "open"}),
+    _entry("Open", "articulated_env", tags=("any-category", "single-object")),
+    _entry("Close", "articulated_env", tags=("any-category", "single-object")),
+    _entry("Scene", "scene_env", tags=("any-category",)),
+    *(
+        _entry(
+            task,
+            "articulated_env",
+            category.name.title().replace("_", ""),
+            ("one-category", "single-object"),
+            categories=(category.name,),
+            split="test" if category.held_out else "train",
+        )
+        for task in ("Open", "Close")
+        for category in CATEGORIES.values()
     ),
 )
 
 
-def environment_ids(tag: str | None = None) -> list[str]:
-    """Ids of the environments that carry a tag, or of all of them.
+def environment_ids(*tags: str) -> list[str]:
+    """Ids of the environments that carry all of the tags.
 
-    >>> environment_ids("open")
-    ['ArtOpen-v0']
+    >>> environment_ids("any-category")
+    ['ArtOpen-v0', 'ArtClose-v0', 'ArtScene-v0']
     """
-    return [entry.id for entry in ENVIRONMENTS if tag is None or tag in entry.tags]
+    return [entry.id for entry in ENVIRONMENTS if entry.tags.issuperset(tags)]
 
 
 def register_environments() -> None:
@@ -48,5 +75,8 @@ def register_environments() -> None:
     for entry in ENVIRONMENTS:
         if entry.id not in gymnasium.registry:
             gymnasium.register(
-                id=entry.id, entry_point=entry.entry_point, max_episode_steps=entry.horizon
+                id=entry.id,
+                entry_point=entry.entry_point,
+                vector_entry_point=entry.vector_entry_point,
+                kwargs=dict(entry.arguments),
             )

@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from artgym.envs.articulated_env import ArtOpenEnv
+from artgym.envs.articulated_env import ArticulatedEnv
 from artgym.envs.observations import ObsMode
 from artgym.errors import InvalidArgumentError, MissingDependencyError, UnknownNameError
 from artgym.experts.scripted import ScriptedExpert
@@ -95,7 +95,7 @@ def _icaf4(env: gymnasium.Env[Any, Any], category: str, weights: Path | None) ->
 
 
 def _expert(env: gymnasium.Env[Any, Any], category: str, weights: Path | None) -> Policy:
-    return ScriptedExpert(cast(ArtOpenEnv, env.unwrapped))
+    return ScriptedExpert(cast(ArticulatedEnv, env.unwrapped))
 
 
 #: In the order of the tables.

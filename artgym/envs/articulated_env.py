@@ -1,10 +1,11 @@
-"""The single-object environment: a hand, a table, one articulated object."""
+"""The environments of one object: a robot, a table, a part to open or to close."""
 
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any, get_args
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -13,18 +14,17 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from artgym.control import MAX_ROTATION, MAX_TRANSLATION, MAX_WIDTH
-from artgym.envs.observations import STATE_FIELDS, ObsMode, observation_space
-from artgym.errors import InvalidArgumentError, NotReadyError, UnknownNameError
-from artgym.geometry import transforms
-from artgym.geometry.rotations import matrix_from_axis_angle
+from artgym.envs import arguments
+from artgym.envs.observations import IMAGE_MODES, ObservationConfig, Observer, ObsMode
+from artgym.envs.snapshot import Snapshot
+from artgym.errors import InvalidArgumentError, NotReadyError
+from artgym.geometry import quaternions, transforms
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject
-from artgym.sim import rays
 from artgym.sim.camera import RenderedCamera, View, ViewDistribution
-from artgym.sim.conversion import pose_from_transform
 from artgym.sim.renderer import own_render_system
-from artgym.sim.robots import T_hand_tcp
-from artgym.sim.scene import ManipulationScene, PartContact, PhysicsConfig
+from artgym.sim.robots import RobotName, T_hand_tcp, hand_from_tcp
+from artgym.sim.scene import ManipulationScene, PartContact, PlacedObject, Reading
 from artgym.sim.setting import add_lights, random_hand_start, random_placement, random_table
 from artgym.tasks import rewards
 from artgym.tasks.rewards import RewardMode
@@ -39,69 +39,34 @@ Array = NDArray[np.floating]
 
 #: Simulator steps in one control step: 20 Hz.
 SUBSTEPS = 6
+#: Control steps of an episode.
+HORIZON = 300
 #: The hand's target stays inside this box, metres.
-WORKSPACE_LOW, WORKSPACE_HIGH = np.array([-1.2, -1.2, 0.0]), np.array([1.5, 1.2, 2.2])
-#: A joint faster than this (m/s or rad/s), or a hand this far out, is a blow-up.
+WORKSPACE_LOW, WORKSPACE_HIGH = (-1.2, -1.2, 0.0), (1.5, 1.2, 2.2)
+#: A joint or hand faster than this (m/s or rad/s), or a hand this far out, is a blow-up.
 MAX_STABLE_SPEED, MAX_STABLE_DISTANCE = 40.0, 3.0
-#: An episode ends when the part has travelled this far in success.
-DONE_TRAVEL = 0.9
+#: An episode ends when the part has made this share of the way that was left, in success.
+DONE_SHARE = 0.9
+#: Open fraction at the start of a closing episode.
+CLOSING_START = (0.6, 0.9)
+#: What an episode draws at random besides its object and the part's start.
+RANDOMISED = ("placement", "hand", "camera", "table", "lights")
 
 _T_TCP_HAND = transforms.invert(T_hand_tcp)
 _PRETTY_SIZE = (480, 360)
+_UNTOUCHED = PartContact(touched=False, pinched=False)
+_REPORTED = tuple((f"{100 * travel:.0f}", travel) for travel in REPORTED_TRAVELS)
 
 
-class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
-    """Open a part of an articulated object with a floating Panda hand.
+class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
+    """What the environments have in common; ``ArtOpenEnv`` describes it.
 
-    **Description.** An object stands on a table, nearly closed. The hand shall take hold of the
-    target part and move it through at least half of its joint's range.
-
-    **Action.** ``Box(-1, 1, (7,), float32)``, at 20 Hz: translation (x, y, z; 1 is 0.02 m) and
-    rotation vector (1 is 0.1 rad) of the hand's tool centre, both in the world frame and relative
-    to where the hand is; jaw opening (-1 closed, 1 open by 0.08 m). Values beyond are clipped.
-
-    **Observation.** By ``obs_mode``:
-
-    - ``"state"``: a vector of the fields of ``observations.STATE_FIELDS``. Privileged.
-    - ``"rgbd"``: ``rgb`` uint8 (H, W, 3), ``depth`` float32 (H * W,) metres along z with 0 where
-      nothing was seen, ``intrinsics`` (9,), ``T_world_camera`` (16,) with OpenCV axes,
-      ``T_world_tcp`` (16,), ``jaw_width`` (1,) and ``target_part``. Needs a renderer.
-    - ``"pointcloud"``: ``points`` float32 (num_points * 3,), world frame, of everything but the
-      table that the camera sees, drawn with repetition; and the hand's fields. By ray casting,
-      without a graphics driver.
-
-    **Reward.** Dense, in [0, 1]: 0.2 for nearness of the tool centre to the part's grip point,
-    0.2 for having the part between the fingers, 0.6 for travel up to half of the range made in
-    contact. Sparse: 1 in success, else 0. ``info["reward_terms"]`` lists the terms.
-
-    **Start.** Object at the table's middle +-5 cm, turned by up to 20 degrees; its open fraction
-    in the category's start interval; the hand above it, half open; a camera in front.
-
-    **End.** Terminated when the part has travelled 90 % of its range in success. Truncated after
-    the horizon (300 steps), or when physics becomes unstable (``info["unstable"]``).
-    ``info["success"]`` follows ``tasks.success``: travel >= 0.5 with >= 80 % of the motion made
-    while touching the part; ``info["success_gripped"]`` asks that the part be between the fingers.
-
-    **Arguments.**
-
-    Args:
-        categories: categories to draw objects from; by default all that have such a split.
-        split: "train", "val" or "test".
-        objects: ids to draw from instead of whole categories.
-        obs_mode: see above.
-        reward_mode: "dense" or "sparse".
-        camera_size: (width, height) of the observed picture, pixels.
-        num_points: of a point cloud.
-        target_part: index of the part to move.
-        render_mode: None or "rgb_array".
-
-    Options of ``reset``: ``object_id`` and ``open_fraction`` choose the episode's object and
-    start.
-
-    **Version history.** v0: first version.
+    Attributes:
+        direction: 1 where the task is to open, -1 where it is to close.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+    direction: ClassVar[float]
 
     def __init__(
         self,
@@ -109,45 +74,71 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         categories: Sequence[str] | None = None,
         split: str = "train",
         objects: Sequence[str] | None = None,
-        obs_mode: ObsMode = "state",
-        reward_mode: RewardMode = "dense",
-        camera_size: tuple[int, int] = (320, 240),
-        num_points: int = 2048,
         target_part: int = 1,
+        robot: RobotName = "hand",
+        control_mode: str = "delta_pose",
+        obs_mode: ObsMode = "state",
+        camera_size: tuple[int, int] = (320, 240),
+        num_cameras: int = 1,
+        camera_poses: Sequence[Any] | None = None,
+        segmentation: bool = False,
+        num_points: int = 2048,
+        reward_mode: RewardMode = "dense",
+        randomised: Sequence[str] = RANDOMISED,
+        horizon: int = HORIZON,
         render_mode: str | None = None,
+        **unknown: Any,
     ) -> None:
-        EzPickle.__init__(
-            self,
-            categories=categories,
-            split=split,
-            objects=objects,
-            obs_mode=obs_mode,
-            reward_mode=reward_mode,
-            camera_size=camera_size,
-            num_points=num_points,
-            target_part=target_part,
-            render_mode=render_mode,
+        self._keep_arguments(
+            {n: v for n, v in locals().items() if n not in ("self", "unknown", "__class__")}
         )
-        _require_known("obs_mode", obs_mode, get_args(ObsMode))
-        _require_known("reward_mode", reward_mode, get_args(RewardMode))
+        for name in unknown:
+            arguments.require_known("argument", name, tuple(self._arguments))
+        arguments.require_known("obs_mode", obs_mode, ObsMode)
+        arguments.require_known("reward_mode", reward_mode, RewardMode)
+        arguments.require_known("robot", robot, RobotName)
+        arguments.require_known("control_mode", control_mode, ("delta_pose",))
         if render_mode is not None:
-            _require_known("render_mode", render_mode, self.metadata["render_modes"])
-        self._object_ids = _drawable_ids(categories, split, objects, target_part)
-        _require_sizes(camera_size, num_points)
+            arguments.require_known("render_mode", render_mode, self.metadata["render_modes"])
+        for name in randomised:
+            arguments.require_known("randomised", name, RANDOMISED)
+        self.camera_size = arguments.require_camera_size(camera_size)
+        arguments.require_between("num_points", num_points, 1, 100_000)
+        arguments.require_between("num_cameras", num_cameras, 1, 16)
+        arguments.require_between("horizon", horizon, 1, 1_000_000)
+        self._Ts_world_camera = None
+        if camera_poses is not None:
+            self._Ts_world_camera = arguments.require_camera_poses(camera_poses)
+            num_cameras = len(self._Ts_world_camera)
+        self._object_ids = arguments.drawable_ids(categories, split, objects, target_part)
         self.obs_mode = obs_mode
         self.reward_mode: RewardMode = reward_mode
         self.render_mode = render_mode
         self.target_part = target_part
-        self.camera_size = camera_size
-        self.num_points = num_points
+        self.horizon = horizon
+        self._randomised = frozenset(randomised)
+        self._observation_config = ObservationConfig(
+            mode=obs_mode,
+            robot=robot,
+            camera_size=self.camera_size,
+            num_cameras=num_cameras,
+            segmentation=bool(segmentation),
+            num_points=num_points,
+            num_parts=arguments.most_parts(self._object_ids),
+        )
+        self.observation_space = self._observation_config.space()
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
-        num_parts = max(_most_parts(i) for i in self._object_ids)
-        self.observation_space = observation_space(obs_mode, camera_size, num_points, num_parts)
-        # One renderer serves observations and render(); state mode alone needs none.
-        self._needs_renderer = obs_mode == "rgbd" or render_mode == "rgb_array"
+        # One renderer serves observations and render(); other modes need none.
+        self._needs_renderer = obs_mode in IMAGE_MODES or render_mode == "rgb_array"
         self._render_system = own_render_system() if self._needs_renderer else None
         self._scene: ManipulationScene | None = None
         self._closed = False
+        self._over = ""
+
+    def _keep_arguments(self, more: Mapping[str, Any]) -> None:
+        """Remembers what this environment is made with, for copies and for snapshots."""
+        self._arguments: dict[str, Any] = {**getattr(self, "_arguments", {}), **more}
+        EzPickle.__init__(self, **self._arguments)
 
     # -- what others may ask -------------------------------------------------------------------
 
@@ -171,9 +162,9 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def view(self) -> View:
-        """The camera of the running episode."""
+        """The first camera of the running episode."""
         self._require_running("view")
-        return self._view
+        return self._views[0]
 
     def joint_positions(self) -> Array:
         """Positions (K - 1,) of all joints, metres or radians."""
@@ -181,7 +172,9 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
 
     def tcp_pose(self) -> Array:
         """``T_world_tcp`` (4, 4)."""
-        return self._hand_pose() @ T_hand_tcp
+        hand = self._running_scene("tcp_pose").hand
+        assert hand is not None
+        return hand.tcp_pose()
 
     def jaw_width(self) -> float:
         """Opening of the jaws, metres."""
@@ -199,90 +192,148 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         Raises:
             InvalidArgumentError: an unknown option, or an open fraction outside [0, 1].
             UnknownNameError: an object id that is not in the catalogue.
+            NotReadyError: the environment is closed.
         """
         super().reset(seed=seed)
         if self._closed:
             raise NotReadyError("reset() after close(): make a new environment.")
-        object_id, fraction = self._read_options(options or {})
+        self._begin(options or {})
+        contact = _UNTOUCHED
+        return self._observe(), self._report(contact)
+
+    def _begin(self, options: Mapping[str, Any]) -> None:
+        """Draws an episode and builds its scene."""
+        object_id, fraction = arguments.read_options(options)
+        asked = None
+        if object_id is not None:
+            asked = catalog.load(object_id)
+            asked.joint_of(self.target_part)
+        self._begun_with = (copy.deepcopy(self.np_random.bit_generator.state), dict(options))
         rng = self.np_random
-        drawn = self._draw_object(rng)
-        self._object = drawn if object_id is None else catalog.load(object_id)
-        category = catalog.category_of(self._object)
-        drawn_fraction = float(rng.uniform(*category.start_fraction))
-        self._T_world_object = random_placement(rng)
-        self._joint = self._object.joint_of(self.target_part)
-        q = self._object.positions_with(
-            self.target_part, drawn_fraction if fraction is None else fraction
-        )
-        T_world_tcp = random_hand_start(rng, self._object)
-        self._view = ViewDistribution.around(self._object).sample(rng, *self.camera_size)
-        table = random_table(rng)
-        light_seed = int(rng.integers(2**31))
-        self._cloud_rng = np.random.default_rng(int(rng.integers(2**31)))
+
+        def source(name: str) -> np.random.Generator:
+            """Where a thing is drawn from: what is not to vary is drawn alike every time."""
+            return rng if name in self._randomised else np.random.default_rng(0)
+
+        obj = self._draw_object(rng) if asked is None else asked
+        drawn_fraction = float(rng.uniform(*self._start_fraction(obj)))
+        T_world_object = random_placement(source("placement"))
+        start = drawn_fraction if fraction is None else fraction
+        q = obj.positions_with(self.target_part, start)
+        target = PlacedObject(model=obj, T_world_object=T_world_object, q=q)
+        others = self._surroundings(target, source("placement"))
+        T_world_tcp = random_hand_start(source("hand"), obj.bounds_at(q)[1])
+        cameras = self._view_distribution(obj)
+        views = [
+            cameras.sample(source("camera"), *self.camera_size)
+            for _ in range(self._observation_config.num_cameras)
+        ]
+        table = random_table(source("table"))
+        light_seed = int(source("lights").integers(2**31))
+        cloud_rng = np.random.default_rng(int(rng.integers(2**31)))
 
         self._drop_scene()
-        self._scene = ManipulationScene(
-            self._object,
-            self._T_world_object,
+        self._object, self._T_world_object = obj, T_world_object
+        self._joint = obj.joint_of(self.target_part)
+        self._views = tuple(views)
+        self._scene = scene = ManipulationScene(
+            obj,
+            T_world_object,
             q,
             T_world_hand=T_world_tcp @ _T_TCP_HAND,
             width=0.5 * MAX_WIDTH,
-            config=PhysicsConfig(),
             render_system=self._render_system,
             table_material=table,
+            others=others,
         )
         if self._needs_renderer:
-            add_lights(self._scene.sapien_scene, np.random.default_rng(light_seed))
-        self._camera = (
-            RenderedCamera(self._scene.sapien_scene, self._view)
-            if self.obs_mode == "rgbd"
-            else None
+            add_lights(scene.sapien_scene, np.random.default_rng(light_seed))
+        self._observer = Observer(
+            self._observation_config,
+            scene,
+            obj,
+            T_world_object,
+            self.target_part,
+            self._views,
+            cloud_rng,
         )
         self._pretty_camera = (
-            RenderedCamera(self._scene.sapien_scene, _pretty_view(self._view))
+            RenderedCamera(scene.sapien_scene, _pretty_view(self._views[0]))
             if self.render_mode == "rgb_array"
             else None
         )
-        self._progress = Progress.begin(float(self._joint.open_fraction(q[self.target_part - 1])))
+        start_fraction = float(self._joint.open_fraction(q[self.target_part - 1]))
+        self._progress = Progress.begin(start_fraction)
+        # How far it would be to the end of the range.
+        self._way = 1.0 - start_fraction if self.direction > 0 else start_fraction
         self._succeeded_once = False
-        return self._observe(), self._info(
-            PartContact(touched=False, pinched=False), unstable=False
-        )
+        self._actions: list[list[float]] = []
+        self._over = ""
+        self._look()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Moves the hand for one control step.
+        """Moves the robot for one control step.
 
         Raises:
             InvalidArgumentError: the action has a wrong shape or is not finite.
             NotReadyError: no episode is running.
         """
-        scene = self._running_scene("step")
-        hand = scene.hand
-        assert hand is not None
-        action = _checked_action(action)
-        T_target = self.tcp_pose()
-        T_target[:3, 3] = np.clip(
-            T_target[:3, 3] + MAX_TRANSLATION * action[:3], WORKSPACE_LOW, WORKSPACE_HIGH
-        )
-        T_target[:3, :3] = matrix_from_axis_angle(MAX_ROTATION * action[3:6]) @ T_target[:3, :3]
-        hand.pull_to(pose_from_transform(T_target @ _T_TCP_HAND))
-        hand.open_jaws(0.5 * MAX_WIDTH * (1.0 + float(action[6])))
-        scene.step(SUBSTEPS)
-
-        if self._is_unstable():
+        if self._scene is None or self._over:
+            self._require_running("step")
+        numbers = arguments.read_action(action, self.action_space.shape[0])
+        contact = self._advance(numbers)
+        if contact is None:
             # Nothing of a blow-up is shown: the last sound state stands in for it.
+            self._over = "the physics of this episode became unstable"
             info = copy.deepcopy(self._last_info) | {"unstable": True}
             return copy.deepcopy(self._last_observation), 0.0, False, True, info
-        contact = scene.contact(self.target_part)
-        q = float(scene.body.positions()[self.target_part - 1])
-        self._progress = self._progress.advance(
-            float(self._joint.open_fraction(q)), contact.touched, contact.pinched
-        )
-        self._succeeded_once |= bool(self._progress.success)
-        info = self._info(contact, unstable=False)
+        info = self._report(contact)
         reward = rewards.reward(self.reward_mode, info["reward_terms"], self._progress)
-        terminated = bool(self._progress.success_at(DONE_TRAVEL))
-        return self._observe(), reward, terminated, False, info
+        terminated = bool(
+            self._progress.success
+            and self._progress.headway(self.direction) >= DONE_SHARE * self._way
+        )
+        return self._observe(), reward, terminated, len(self._actions) >= self.horizon, info
+
+    def _advance(self, numbers: list[float]) -> PartContact | None:
+        """Does an action; how the hand then touches the part, or None after a blow-up."""
+        scene = self._scene
+        assert scene is not None
+        self._actions.append(numbers)
+        self._move(numbers)
+        scene.step(SUBSTEPS)
+        reading = scene.read(self.target_part)
+        if not reading.is_sound(MAX_STABLE_SPEED, MAX_STABLE_DISTANCE):
+            return None
+        self._reading = reading
+        self._grip_point = self._observer.grip_point(reading)
+        contact = scene.contact(self.target_part)
+        fraction = self._joint.open_fraction(reading.q[self.target_part - 1])
+        self._progress = self._progress.advance(fraction, contact.touched, contact.pinched)
+        self._succeeded_once |= self._progress.success
+        return contact
+
+    def _move(self, action: list[float]) -> None:
+        """Tells the robot where to go."""
+        scene = self._scene
+        assert scene is not None
+        hand = scene.hand
+        assert hand is not None
+        dx, dy, dz, rx, ry, rz, jaws = action
+        x, y, z = self._reading.tcp_position
+        (x0, y0, z0), (x1, y1, z1) = WORKSPACE_LOW, WORKSPACE_HIGH
+        turn = quaternions.quaternion_from_rotation_vector(
+            MAX_ROTATION * rx, MAX_ROTATION * ry, MAX_ROTATION * rz
+        )
+        target = (
+            min(max(x + MAX_TRANSLATION * dx, x0), x1),
+            min(max(y + MAX_TRANSLATION * dy, y0), y1),
+            min(max(z + MAX_TRANSLATION * dz, z0), z1),
+        )
+        hand.pull_to(
+            hand_from_tcp(target, quaternions.product(turn, self._reading.hand_quaternion))
+        )
+        hand.open_jaws(0.5 * MAX_WIDTH * (1.0 + jaws))
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (360, 480, 3) uint8 if ``render_mode`` is "rgb_array"."""
@@ -300,6 +351,64 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._drop_scene()
         self._closed = True
 
+    # -- snapshots -----------------------------------------------------------------------------
+
+    def get_state(self) -> Snapshot:
+        """The running episode, to be gone on with by ``set_state``; see ``Snapshot``.
+
+        Raises:
+            NotReadyError: no episode is running.
+        """
+        self._require_running("get_state")
+        generator, options = self._begun_with
+        return Snapshot(
+            environment=(type(self).__name__, self._arguments),
+            generator=copy.deepcopy(generator),
+            options=dict(options),
+            actions=np.array(self._actions).reshape(-1, *self.action_space.shape),
+            cloud_generator=copy.deepcopy(self._observer.rng.bit_generator.state),
+        )
+
+    def set_state(self, state: Snapshot) -> tuple[Any, dict[str, Any]]:
+        """Brings an episode back as it was, and gives its observation and info again.
+
+        Every later step and reset is the same to the last bit as it was, or would have been,
+        after ``get_state``. Takes as long as the steps up to there without their observations.
+
+        Raises:
+            InvalidArgumentError: it was taken of an environment made with other arguments.
+            NotReadyError: the environment is closed.
+        """
+        if self._closed:
+            raise NotReadyError("set_state() after close(): make a new environment.")
+        if not isinstance(state, Snapshot) or state.environment != (
+            type(self).__name__,
+            self._arguments,
+        ):
+            raise InvalidArgumentError(
+                "set_state(): expected what get_state() gave, of an environment of the same class "
+                f"made with the same arguments; got {getattr(state, 'environment', state)!r}, this "
+                f"is {(type(self).__name__, self._arguments)!r}."
+            )
+        self.np_random.bit_generator.state = copy.deepcopy(state.generator)
+        self._begin(state.options)
+        contact: PartContact | None = _UNTOUCHED
+        for numbers in state.actions.tolist():
+            contact = self._advance(numbers)
+        if contact is None:
+            raise InvalidArgumentError("set_state(): the actions of this state end in a blow-up.")
+        self._observer.rng.bit_generator.state = copy.deepcopy(state.cloud_generator)
+        observation = self._observe()
+        # As if it had not been observed once more.
+        self._observer.rng.bit_generator.state = copy.deepcopy(state.cloud_generator)
+        return observation, self._report(contact)
+
+    # -- what tasks may change -----------------------------------------------------------------
+
+    def _start_fraction(self, obj: ArticulatedObject) -> tuple[float, float]:
+        """Interval of the open fraction at which an episode starts."""
+        raise NotImplementedError
+
     def _draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
         """One of the objects that have the target part."""
         while True:
@@ -308,147 +417,62 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             if self.target_part < obj.num_parts:
                 return obj
 
+    def _surroundings(
+        self, target: PlacedObject, rng: np.random.Generator
+    ) -> Sequence[PlacedObject]:
+        """What else stands on the table."""
+        return ()
+
+    def _view_distribution(self, obj: ArticulatedObject) -> ViewDistribution:
+        """Where cameras stand."""
+        return ViewDistribution.around(obj)
+
     # -- parts of a step -----------------------------------------------------------------------
 
+    def _look(self) -> None:
+        """Reads the scene as it stands."""
+        scene = self._scene
+        assert scene is not None
+        self._reading: Reading = scene.read(self.target_part)
+        self._grip_point = self._observer.grip_point(self._reading)
+
     def _observe(self) -> Any:
-        if self.obs_mode == "state":
-            observation: Any = self._state_vector()
-        else:
-            observation = {
-                "T_world_tcp": self.tcp_pose().astype(np.float32).reshape(-1),
-                "jaw_width": np.array([self.jaw_width()], dtype=np.float32),
-                "target_part": np.int64(self.target_part),
-            }
-            if self.obs_mode == "pointcloud":
-                observation["points"] = self._point_cloud()
-            else:
-                assert self._camera is not None
-                rgb, depth = self._camera.take()
-                observation["rgb"] = rgb
-                observation["depth"] = depth.reshape(-1)
-                observation["intrinsics"] = self._view.intrinsics.astype(np.float32).reshape(-1)
-                observation["T_world_camera"] = self._view.T_world_camera.astype(
-                    np.float32
-                ).reshape(-1)
-        self._last_observation = observation
-        return observation
+        self._last_observation = self._observer.observe(
+            self._reading, self._grip_point, float(self._progress.fraction)
+        )
+        return self._last_observation
 
-    def _state_vector(self) -> NDArray[np.float32]:
-        scene = self._running_scene("observe")
-        assert scene.hand is not None
-        T_world_tcp = self.tcp_pose()
-        velocity = scene.hand.velocity()
-        link_pose = scene.body.link_poses()[self.target_part]
-        joint = self._joint
-        R_world_object = self._T_world_object[:3, :3]
-        pivot = self._T_world_object @ np.append(joint.pivot, 1.0)
-        grip = self._grip_point_world(link_pose)
-        bounds = self._object.links[self.target_part].bounds()
-        fields = {
-            "tcp_position": T_world_tcp[:3, 3],
-            "tcp_x_axis": T_world_tcp[:3, 0],
-            "tcp_z_axis": T_world_tcp[:3, 2],
-            "tcp_linear_velocity": velocity[:3],
-            "tcp_angular_velocity": velocity[3:],
-            "jaw_width": [scene.hand.width()],
-            "open_fraction": [self._progress.fraction],
-            "joint_velocity": [scene.body.velocities()[self.target_part - 1]],
-            "is_revolute": [float(joint.type == "revolute")],
-            "joint_axis": R_world_object @ np.asarray(joint.axis),
-            "joint_pivot": pivot[:3],
-            "grip_point": grip,
-            "tcp_to_grip_point": grip - T_world_tcp[:3, 3],
-            "part_size": bounds[1] - bounds[0],
-        }
-        return np.concatenate([fields[name] for name in STATE_FIELDS]).astype(np.float32)
-
-    def _point_cloud(self) -> NDArray[np.float32]:
-        """Points the camera sees, the table left out, world frame, flattened."""
-        scene = self._running_scene("observe")
-        view = self._view
-        width, height = view.width // 2, view.height // 2
-        intrinsics = view.intrinsics * [[0.5], [0.5], [1.0]]
-        links = self._object.links
-        bodies = [*(rays.link_body(link) for link in links), *rays.hand_bodies()]
-        hand_poses = rays.hand_poses(self._hand_pose(), self.jaw_width())
-        poses = np.concatenate([scene.body.link_poses(), hand_poses])
-        directions = rays.camera_rays(intrinsics, width, height, view.T_world_camera)
-        eye = view.T_world_camera[:3, 3]
-        hits = rays.cast(bodies, poses, eye, directions)
-        seen = np.flatnonzero(hits.body >= 0)
-        if not len(seen):
-            return np.tile(eye, self.num_points).astype(np.float32)
-        chosen = self._cloud_rng.choice(seen, self.num_points, replace=len(seen) < self.num_points)
-        points = eye + hits.distance[chosen, None] * directions[chosen]
-        return points.astype(np.float32).reshape(-1)
-
-    def _info(self, contact: PartContact, *, unstable: bool) -> dict[str, Any]:
+    def _report(self, contact: PartContact) -> dict[str, Any]:
+        """``info`` of the state just read."""
         progress = self._progress
-        link_pose = self._running_scene("info").body.link_poses()[self.target_part]
-        distance = np.linalg.norm(self._grip_point_world(link_pose) - self.tcp_pose()[:3, 3])
-        speed = float(self._running_scene("info").body.velocities()[self.target_part - 1])
-        info = {
+        speed = self._reading.velocities[self.target_part - 1]
+        distance = math.dist(self._grip_point, self._reading.tcp_position)
+        self._last_info = info = {
             "object_id": self._object.object_id,
             "success": bool(progress.success),
             "success_gripped": bool(progress.success_gripped),
-            "success_once": self._succeeded_once,
-            "success_at": {
-                f"{100 * t:.0f}": bool(progress.success_at(t)) for t in REPORTED_TRAVELS
-            },
+            "success_once": bool(self._succeeded_once),
+            "success_at": {name: bool(progress.success_at(t)) for name, t in _REPORTED},
             "success_maniskill": maniskill_success(progress, speed),
             "success_where2act": where2act_success(progress, self._joint.range),
-            "travel": float(progress.travel),
-            "engaged": float(progress.engaged),
-            "gripped": float(progress.gripped),
-            "open_fraction": float(progress.fraction),
-            "reward_terms": rewards.dense_terms(float(distance), contact.pinched, progress),
-            "unstable": unstable,
+            "travel": progress.travel,
+            "engaged": progress.engaged,
+            "gripped": progress.gripped,
+            "open_fraction": progress.fraction,
+            "reward_terms": rewards.dense_terms(
+                distance, contact.pinched, progress, self.direction
+            ),
+            "elapsed_steps": len(self._actions),
+            "unstable": False,
         }
-        self._last_info = info
         return info
-
-    def _grip_point_world(self, T_world_part: Array) -> Array:
-        point = self._object.grip_point(self.target_part)
-        return T_world_part[:3, :3] @ point + T_world_part[:3, 3]
-
-    def _hand_pose(self) -> Array:
-        hand = self._running_scene("hand").hand
-        assert hand is not None
-        return hand.pose()
-
-    def _is_unstable(self) -> bool:
-        scene = self._running_scene("step")
-        assert scene.hand is not None
-        state = np.concatenate(
-            [scene.body.positions(), scene.body.velocities(), scene.hand.pose()[:3, 3]]
-        )
-        if not np.all(np.isfinite(state)):
-            return True
-        too_fast = np.abs(scene.body.velocities()).max() > MAX_STABLE_SPEED
-        velocity = np.abs(scene.hand.velocity()).max()
-        away = np.abs(scene.hand.pose()[:3, 3]).max() > MAX_STABLE_DISTANCE
-        return bool(too_fast or away or not velocity < MAX_STABLE_SPEED)
-
-    # -- checks --------------------------------------------------------------------------------
-
-    def _read_options(self, options: Mapping[str, Any]) -> tuple[str | None, float | None]:
-        for key in options:
-            _require_known("reset option", key, ("object_id", "open_fraction"))
-        asked = options.get("open_fraction")
-        try:
-            fraction = None if asked is None else float(asked)
-        except (TypeError, ValueError):
-            fraction = np.nan
-        if fraction is not None and not 0.0 <= fraction <= 1.0:
-            raise InvalidArgumentError(
-                f"options['open_fraction']={asked!r}: expected 0 (closed) to 1 (open)"
-            )
-        return options.get("object_id"), fraction
 
     def _require_running(self, what: str) -> None:
         if self._scene is None:
             reason = "after close(): make a new environment" if self._closed else "before reset()"
             raise NotReadyError(f"{what} {reason}.")
+        if self._over:
+            raise NotReadyError(f"{what}: {self._over}; call reset().")
 
     def _running_scene(self, what: str) -> ManipulationScene:
         self._require_running(what)
@@ -456,75 +480,10 @@ class ArtOpenEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         return self._scene
 
     def _drop_scene(self) -> None:
-        self._camera = self._pretty_camera = None
+        self._pretty_camera = None
         if self._scene is not None:
             self._scene.close()
             self._scene = None
-
-
-def _drawable_ids(
-    categories: Sequence[str] | None,
-    split: str,
-    objects: Sequence[str] | None,
-    target_part: int,
-) -> tuple[str, ...]:
-    """Ids to draw from, each known and, where it is named, with the asked part."""
-    if objects is not None:
-        ids = (objects,) if isinstance(objects, str) else tuple(objects)
-        for object_id in ids:
-            catalog.load(object_id).joint_of(target_part)
-    else:
-        names = catalog.categories_with(split) if categories is None else categories
-        names = (names,) if isinstance(names, str) else tuple(names)
-        for name in names:
-            parts = catalog.category(name).parts
-            if not 1 <= target_part < len(parts):
-                raise InvalidArgumentError(
-                    f"target_part={target_part}: category {name!r} has the movable parts "
-                    + ", ".join(f"{i} ({part})" for i, part in enumerate(parts) if i)
-                )
-        ids = tuple(i for name in names for i in catalog.object_ids(name, split))  # type: ignore[arg-type]
-    if not ids:
-        raise InvalidArgumentError("no objects to draw from: give categories or objects.")
-    return ids
-
-
-def _most_parts(object_id: str) -> int:
-    """The most parts that an object of this kind can have."""
-    name = object_id.partition("/")[0]
-    if name in catalog.CATEGORIES:
-        return len(catalog.CATEGORIES[name].parts)
-    return catalog.load(object_id).num_parts
-
-
-def _require_known(kind: str, name: object, known: Sequence[str]) -> None:
-    if name not in known:
-        raise UnknownNameError(kind, name, known)
-
-
-def _require_sizes(camera_size: tuple[int, int], num_points: int) -> None:
-    width, height = camera_size
-    if not (16 <= width <= 4096 and 16 <= height <= 4096):
-        raise InvalidArgumentError(
-            f"camera_size={camera_size}: expected (width, height) of 16 to 4096 pixels"
-        )
-    if not 1 <= num_points <= 100_000:
-        raise InvalidArgumentError(f"num_points={num_points}: expected 1 to 100,000")
-
-
-def _checked_action(action: NDArray[np.float32]) -> Array:
-    """The action as finite numbers in [-1, 1], (7,)."""
-    try:
-        numbers = np.asarray(action, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidArgumentError(f"action={action!r}: expected 7 numbers in [-1, 1]") from error
-    if numbers.shape != (7,):
-        raise InvalidArgumentError(
-            f"action of shape {numbers.shape}: expected (7,): translation, rotation, jaws"
-        )
-    if not np.all(np.isfinite(numbers)):
-        raise InvalidArgumentError(f"action={numbers.tolist()}: expected finite numbers in [-1, 1]")
-    return np.clip(numbers, -1.0, 1.0)
 
 
 def _pretty_view(view: View) -> View:
@@ -533,3 +492,103 @@ def _pretty_view(view: View) -> View:
     return View(
         T_world_camera=view.T_world_camera, fov_y=1.2 * view.fov_y, width=width, height=height
     )
+
+
+class ArtOpenEnv(ArticulatedEnv):
+    """Open a part of an articulated object.
+
+    **Description.** An object stands on a table, nearly closed. The robot, a floating Panda hand
+    or a Panda arm, shall take hold of the target part and move it through at least half of its
+    joint's range.
+
+    **Action.** ``Box(-1, 1, float32)`` at 20 Hz, by ``control_mode``; values beyond are clipped.
+
+    - ``"delta_pose"``, (7,): translation (x, y, z; 1 is 0.02 m) and rotation vector (1 is 0.1 rad)
+      of the hand's tool centre, both in the world frame and relative to where the hand is; jaw
+      opening (-1 closed, 1 open by 0.08 m).
+
+    **Observation.** By ``obs_mode``:
+
+    - ``"state"``: a vector of the fields of ``observations.STATE_FIELDS``. Privileged.
+    - ``"state_dict"``: the same fields by name.
+    - ``"rgb"``: of each camera ``rgb`` uint8 (H, W, 3), ``intrinsics`` (9,) and
+      ``T_world_camera`` (16,) with OpenCV axes; and ``T_world_tcp`` (16,), ``jaw_width`` (1,) and
+      ``target_part``. The second camera's fields end in ``_1``, and so on. Needs a renderer.
+    - ``"rgbd"``: the same and ``depth`` float32 (H * W,), metres along z, 0 where nothing was seen.
+    - ``"pointcloud"``: ``points`` float32 (num_points * 3,), world frame, of everything but the
+      table that the first camera sees, drawn with repetition where there are too few; and the
+      hand's fields. By ray casting, without a graphics driver.
+
+    **Reward.** Dense, in [0, 1]: 0.2 for nearness of the tool centre to the part's grip point,
+    0.2 for having the part between the fingers, 0.6 for opening it by half of its range in
+    contact. Sparse: 1 in success, else 0. ``info["reward_terms"]`` lists the terms.
+
+    **Start.** Object at the table's middle +-5 cm, turned by up to 20 degrees; its open fraction
+    in the category's start interval; the hand above it, half open; cameras in front.
+
+    **End.** Terminated when the part has made 90 % of the way that was left to the end of its
+    range, in success. Truncated after ``horizon`` steps, or when physics becomes unstable
+    (``info["unstable"]``; the last sound observation is shown). ``info["success"]`` follows
+    ``tasks.success``: travel >= 0.5 with >= 80 % of the motion made while touching the part;
+    ``info["success_gripped"]`` asks that the part be between the fingers.
+
+    **Arguments.**
+
+    Args:
+        categories: categories to draw objects from; by default all that have such a split and the
+            target part.
+        split: "train", "val" or "test".
+        objects: ids to draw from instead of whole categories.
+        target_part: index of the part to move.
+        robot: "hand" floats; "panda" is an arm.
+        control_mode: see Action.
+        obs_mode: see Observation.
+        camera_size: (width, height) of the observed pictures, pixels.
+        num_cameras: how many cameras see the scene.
+        camera_poses: where they stand, ``T_world_camera`` (4, 4) each with OpenCV axes, instead
+            of at random places.
+        segmentation: whether pictures and clouds come with ``segmentation``.
+        num_points: of a point cloud.
+        reward_mode: "dense" or "sparse".
+        randomised: what an episode draws at random besides its object and the part's start:
+            "placement", "hand", "camera", "table", "lights"; the rest is the same every time.
+        horizon: control steps after which an episode is truncated.
+        render_mode: None or "rgb_array".
+
+    Options of ``reset``: ``object_id`` and ``open_fraction`` choose the episode's object and
+    start. ``get_state`` and ``set_state`` bring an episode back, to the last bit.
+
+    **Version history.** v0: first version.
+    """
+
+    direction = 1.0
+
+    def _start_fraction(self, obj: ArticulatedObject) -> tuple[float, float]:
+        return catalog.category_of(obj).start_fraction
+
+
+class ArtCloseEnv(ArticulatedEnv):
+    """Close a part of an articulated object.
+
+    **Description.** As ``ArtOpenEnv``, but the part stands open and is to be closed by at least
+    half of its range.
+
+    **Action.** As ``ArtOpenEnv``.
+
+    **Observation.** As ``ArtOpenEnv``.
+
+    **Reward.** As ``ArtOpenEnv``; the last term pays for closing.
+
+    **Start.** As ``ArtOpenEnv``; the open fraction is between 0.6 and 0.9.
+
+    **End.** As ``ArtOpenEnv``: terminated when it is closed but for a tenth of the way.
+
+    **Arguments.** As ``ArtOpenEnv``.
+
+    **Version history.** v0: first version.
+    """
+
+    direction = -1.0
+
+    def _start_fraction(self, obj: ArticulatedObject) -> tuple[float, float]:
+        return CLOSING_START

@@ -1,4 +1,4 @@
-"""What an observation holds in each mode, and the spaces that say so.
+"""What an observation holds in each mode, the spaces that say so, and how it is made.
 
 Apart from uint8 images everything is a vector, since learning libraries take nothing else
 without complaint: ``depth`` is the picture row by row, a transform its 16 numbers.
@@ -7,60 +7,263 @@ without complaint: ``depth`` is the picture row by row, a transform its 16 numbe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Literal, get_args
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
-ObsMode = Literal["state", "rgbd", "pointcloud"]
+from artgym.geometry import quaternions, transforms
+from artgym.objects.model import ArticulatedObject
+from artgym.sim import rays
+from artgym.sim.camera import RenderedCamera, View
+from artgym.sim.robots import RobotName
+from artgym.sim.scene import ManipulationScene, Reading
 
-#: Fields of the state vector, in order, with their sizes. Metres, radians, world frame.
-STATE_FIELDS: Mapping[str, int] = {
-    "tcp_position": 3,
-    "tcp_x_axis": 3,
-    "tcp_z_axis": 3,
-    "tcp_linear_velocity": 3,
-    "tcp_angular_velocity": 3,
-    "jaw_width": 1,
-    "open_fraction": 1,
-    "joint_velocity": 1,
-    "is_revolute": 1,
-    "joint_axis": 3,
-    "joint_pivot": 3,
-    "grip_point": 3,
-    "tcp_to_grip_point": 3,
-    "part_size": 3,
-}
+Array = NDArray[np.floating]
+
+ObsMode = Literal["state", "state_dict", "rgb", "rgbd", "pointcloud"]
+OBS_MODES: tuple[ObsMode, ...] = get_args(ObsMode)
+#: Modes that need a renderer.
+IMAGE_MODES: tuple[ObsMode, ...] = ("rgb", "rgbd")
+
+_HAND_FIELDS: Mapping[str, int] = MappingProxyType(
+    {
+        "tcp_position": 3,
+        "tcp_x_axis": 3,
+        "tcp_z_axis": 3,
+        "tcp_linear_velocity": 3,
+        "tcp_angular_velocity": 3,
+        "jaw_width": 1,
+        "open_fraction": 1,
+        "joint_velocity": 1,
+        "is_revolute": 1,
+        "joint_axis": 3,
+        "joint_pivot": 3,
+        "grip_point": 3,
+        "tcp_to_grip_point": 3,
+        "part_size": 3,
+    }
+)
+
+#: Fields of the state vector by robot, in order, with their sizes. Metres, radians, world frame;
+#: ``arm_*`` are the arm's joints.
+STATE_FIELDS: Mapping[RobotName, Mapping[str, int]] = MappingProxyType(
+    {
+        "hand": _HAND_FIELDS,
+        "panda": MappingProxyType({**_HAND_FIELDS, "arm_positions": 7, "arm_velocities": 7}),
+    }
+)
 
 #: No coordinate, velocity or size in a scene that is still stable exceeds this.
 LIMIT = 50.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObservationConfig:
+    """What determines the space of observations.
+
+    Attributes:
+        mode: which observation.
+        robot: whose state it holds.
+        camera_size: (width, height) of a picture, pixels.
+        num_cameras: how many see the scene.
+        segmentation: whether pictures and clouds come with labels.
+        num_points: of a cloud.
+        num_parts: most parts an object can have, the base included.
+    """
+
+    mode: ObsMode
+    robot: RobotName
+    camera_size: tuple[int, int]
+    num_cameras: int
+    segmentation: bool
+    num_points: int
+    num_parts: int
+
+    def space(self) -> spaces.Space[Any]:
+        """The space that holds every observation."""
+        fields = STATE_FIELDS[self.robot]
+        if self.mode == "state":
+            return _vector(sum(fields.values()))
+        if self.mode == "state_dict":
+            return spaces.Dict({name: _vector(size) for name, size in fields.items()})
+        found: dict[str, spaces.Space[Any]] = {
+            "T_world_tcp": _vector(16, 10.0),
+            "jaw_width": spaces.Box(-0.01, 0.1, (1,), np.float32),
+            "target_part": spaces.Discrete(self.num_parts),
+        }
+        if self.mode == "pointcloud":
+            found["points"] = _vector(3 * self.num_points, 10.0)
+            if self.segmentation:
+                found["segmentation"] = spaces.Box(0, 255, (self.num_points,), np.uint8)
+            return spaces.Dict(found)
+        width, height = self.camera_size
+        for i in range(self.num_cameras):
+            picture: dict[str, spaces.Space[Any]] = {
+                "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
+                "intrinsics": spaces.Box(0.0, 1e4, (9,), np.float32),
+                "T_world_camera": _vector(16, 10.0),
+            }
+            if self.mode == "rgbd":
+                picture["depth"] = spaces.Box(0.0, 10.0, (height * width,), np.float32)
+            if self.segmentation:
+                picture["segmentation"] = spaces.Box(0, 255, (height * width,), np.uint8)
+            found |= {of_camera(name, i): space for name, space in picture.items()}
+        return spaces.Dict(found)
 
 
 def _vector(size: int, limit: float = LIMIT) -> spaces.Box:
     return spaces.Box(-limit, limit, (size,), np.float32)
 
 
-def observation_space(
-    mode: ObsMode, camera_size: tuple[int, int], num_points: int, num_parts: int
-) -> spaces.Space[Any]:
-    """The space of a mode; ``camera_size`` is (width, height) in pixels."""
-    if mode == "state":
-        return _vector(sum(STATE_FIELDS.values()))
-    hand = {
-        "T_world_tcp": _vector(16, 10.0),
-        "jaw_width": spaces.Box(-0.01, 0.1, (1,), np.float32),
-        "target_part": spaces.Discrete(num_parts),
-    }
-    if mode == "pointcloud":
-        return spaces.Dict({"points": _vector(3 * num_points, 10.0), **hand})
-    width, height = camera_size
-    return spaces.Dict(
-        {
-            "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
-            "depth": spaces.Box(0.0, 10.0, (height * width,), np.float32),
-            "intrinsics": spaces.Box(0.0, 1e4, (9,), np.float32),
-            "T_world_camera": _vector(16, 10.0),
-            **hand,
+def of_camera(name: str, camera: int) -> str:
+    """The key of a camera's field: "rgb" of the first camera, "rgb_1" of the second, ...
+
+    >>> of_camera("rgb", 1)
+    'rgb_1'
+    """
+    return f"{name}_{camera}" if camera else name
+
+
+class Observer:
+    """Makes the observations of one episode.
+
+    Args:
+        config: which observations.
+        scene: what is observed.
+        obj: the object in it that is to be moved.
+        target_part: index of the part to move.
+        views: the cameras.
+        rng: for the choice of a cloud's points.
+    """
+
+    def __init__(
+        self,
+        config: ObservationConfig,
+        scene: ManipulationScene,
+        obj: ArticulatedObject,
+        T_world_object: Array,
+        target_part: int,
+        views: Sequence[View],
+        rng: np.random.Generator,
+    ) -> None:
+        self.config = config
+        self.rng = rng
+        self._scene = scene
+        self._part = target_part
+        self._views = tuple(views)
+        self._cameras = (
+            [RenderedCamera(scene.sapien_scene, view) for view in views]
+            if config.mode in IMAGE_MODES
+            else []
+        )
+        joint = obj.joint_of(target_part)
+        self._grip_point_part: list[float] = obj.grip_point(target_part).tolist()
+        size = np.ptp(obj.links[target_part].bounds(), axis=0)
+        axis = T_world_object[:3, :3] @ np.asarray(joint.axis)
+        pivot = transforms.apply(T_world_object, np.asarray(joint.pivot, dtype=float)[None])[0]
+        self._joint = (float(joint.type == "revolute"), *axis.tolist(), *pivot.tolist())
+        self._part_size = tuple(size.tolist())
+
+    def grip_point(self, reading: Reading) -> quaternions.Vector:
+        """Where the part is best taken, world frame, metres: ``ArticulatedObject.grip_point``."""
+        x, y, z = quaternions.rotate(reading.part_quaternion, self._grip_point_part)
+        a, b, c = reading.part_position
+        return a + x, b + y, c + z
+
+    def observe(
+        self, reading: Reading, grip_point: quaternions.Vector, open_fraction: float
+    ) -> Any:
+        """The observation of the scene as it stands.
+
+        Args:
+            reading: of the scene, just made.
+            grip_point: of that reading.
+            open_fraction: of the target part.
+        """
+        mode = self.config.mode
+        if mode in ("state", "state_dict"):
+            vector = self._state_vector(reading, grip_point, open_fraction)
+            return vector if mode == "state" else self._fields(vector)
+        robot = self._scene.hand
+        assert robot is not None
+        observation: dict[str, Any] = {
+            "T_world_tcp": robot.tcp_pose().astype(np.float32).reshape(-1),
+            "jaw_width": np.array([reading.jaw_width], dtype=np.float32),
+            "target_part": np.int64(self._part),
         }
-    )
+        if mode == "pointcloud":
+            return observation | self._cloud()
+        for i, camera in enumerate(self._cameras):
+            observation |= {of_camera(n, i): v for n, v in self._picture(camera).items()}
+        return observation
+
+    def _state_vector(
+        self, reading: Reading, grip_point: quaternions.Vector, open_fraction: float
+    ) -> NDArray[np.float32]:
+        """The fields of ``STATE_FIELDS`` one after another."""
+        tcp, turn = reading.tcp_position, reading.hand_quaternion
+        return np.array(
+            (
+                *tcp,
+                *quaternions.x_axis(turn),
+                *quaternions.z_axis(turn),
+                *reading.linear_velocity,
+                *reading.angular_velocity,
+                reading.jaw_width,
+                open_fraction,
+                reading.velocities[self._part - 1],
+                *self._joint,
+                *grip_point,
+                grip_point[0] - tcp[0],
+                grip_point[1] - tcp[1],
+                grip_point[2] - tcp[2],
+                *self._part_size,
+                *reading.arm_positions,
+                *reading.arm_velocities,
+            ),
+            dtype=np.float32,
+        )
+
+    def _fields(self, vector: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
+        sizes = STATE_FIELDS[self.config.robot]
+        ends = np.cumsum(list(sizes.values()))
+        pieces = np.split(vector, ends[:-1])
+        return {name: piece.copy() for name, piece in zip(sizes, pieces, strict=True)}
+
+    def _picture(self, camera: RenderedCamera) -> dict[str, Any]:
+        rgb, depth = camera.take()
+        found: dict[str, Any] = {
+            "rgb": rgb,
+            "intrinsics": camera.view.intrinsics.astype(np.float32).reshape(-1),
+            "T_world_camera": camera.view.T_world_camera.astype(np.float32).reshape(-1),
+        }
+        if self.config.mode == "rgbd":
+            found["depth"] = depth.reshape(-1)
+        return found
+
+    def _cloud(self) -> dict[str, Any]:
+        """Points that the cameras see, the table left out, world frame, flattened."""
+        scene, view, count = self._scene, self._views[0], self.config.num_points
+        assert scene.hand is not None
+        width, height = view.width // 2, view.height // 2
+        intrinsics = view.intrinsics * [[0.5], [0.5], [1.0]]
+        bodies = [
+            *(rays.link_body(link) for body in scene.bodies for link in body.model.links),
+            *rays.hand_bodies(),
+        ]
+        hand_poses = rays.hand_poses(scene.hand.pose(), scene.hand.width())
+        poses = np.concatenate([*(body.link_poses() for body in scene.bodies), hand_poses])
+        directions = rays.camera_rays(intrinsics, width, height, view.T_world_camera)
+        eye = view.T_world_camera[:3, 3]
+        hits = rays.cast(bodies, poses, eye, directions)
+        seen = np.flatnonzero(hits.body >= 0)
+        if not len(seen):
+            return {"points": np.tile(eye, count).astype(np.float32)}
+        chosen = self.rng.choice(seen, count, replace=len(seen) < count)
+        points = eye + hits.distance[chosen, None] * directions[chosen]
+        return {"points": points.astype(np.float32).reshape(-1)}

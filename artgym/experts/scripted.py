@@ -11,7 +11,7 @@ from artgym.annotation.annotate import visible_points
 from artgym.annotation.filter import Verdict, judge
 from artgym.annotation.trial import try_grasp
 from artgym.control import GraspExecutor, GraspPlan
-from artgym.envs.articulated_env import ArtOpenEnv
+from artgym.envs.articulated_env import ArticulatedEnv
 from artgym.geometry import transforms
 from artgym.geometry.grasps import T_GRASP_TCP, candidate_rotations
 from artgym.geometry.rotations import matrix_from_axis_angle
@@ -34,7 +34,7 @@ class ScriptedExpert:
 
     name = "expert"
 
-    def __init__(self, env: ArtOpenEnv, *, points: int = 40, trials: int = 60) -> None:
+    def __init__(self, env: ArticulatedEnv, *, points: int = 40, trials: int = 60) -> None:
         self._env = env
         self._points = points
         self._trials = trials
@@ -72,13 +72,14 @@ class ScriptedExpert:
             return None
         R_world_object = env.T_world_object[:3, :3]
         pivot = env.T_world_object @ np.append(joint.pivot, 1.0)
-        direction = np.sign(joint.range)
+        direction = np.sign(joint.range) * env.direction
+        end = joint.open if env.direction > 0 else joint.closed
         return GraspPlan(
             T_world_tcp=env.T_world_object @ T_grasp @ T_GRASP_TCP,
             joint_type=joint.type,
             axis_world=direction * (R_world_object @ np.asarray(joint.axis)),
             pivot_world=pivot[:3],
-            displacement=abs(joint.open - float(q[part - 1])),
+            displacement=abs(end - float(q[part - 1])),
         )
 
     def _working_grasp(self) -> Array | None:

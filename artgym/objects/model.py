@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property, lru_cache
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -306,13 +306,19 @@ class Link:
             total += mass * (d @ d * np.eye(3) - np.outer(d, d))
         return total
 
+    @cached_property
+    def _bounds(self) -> Array:
+        return self.bounds(roles=get_args(Role))
+
     def bounds(self, roles: tuple[Role, ...] | None = None) -> Array:
         """Axis-aligned box (2, 3), min and max, in the link's frame.
 
         Args:
             roles: only pieces of these; all by default. Without such a piece it is +inf, -inf.
         """
-        chosen = [s.corners_link() for s in self.shapes if roles is None or s.role in roles]
+        if roles is None:
+            return self._bounds.copy()
+        chosen = [s.corners_link() for s in self.shapes if s.role in roles]
         corners = np.concatenate([np.empty((0, 3)), *chosen])
         return np.stack([corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)])
 
@@ -440,6 +446,18 @@ class ArticulatedObject:
         """Axis-aligned box (2, 3) of the whole object at rest, object frame: NAOCS's box."""
         bounds = np.stack([link.bounds() for link in self.links])
         return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
+
+    def bounds_at(self, q: Array) -> Array:
+        """An axis-aligned box (2, 3) around the object at joint positions q, object frame.
+
+        Made of the links' boxes, so that turned links have some room in it.
+        """
+        poses = self.link_poses(q)
+        bounds = np.stack([link.bounds() for link in self.links])
+        middle, half = bounds.mean(axis=1), np.ptp(bounds, axis=1) / 2
+        corners = middle[:, None] + _BOX_SIGNS * half[:, None]
+        moved = np.einsum("kij,knj->kni", poses[:, :3, :3], corners) + poses[:, None, :3, 3]
+        return np.stack([moved.min(axis=(0, 1)), moved.max(axis=(0, 1))])
 
     @cached_property
     def body_bounds(self) -> Array:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import sapien
@@ -17,12 +19,15 @@ from numpy.typing import NDArray
 from sapien import physx
 
 from artgym.errors import MissingDependencyError
-from artgym.geometry import transforms
+from artgym.geometry import quaternions, transforms
 from artgym.geometry.grasps import T_GRASP_TCP
 from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.sim.conversion import pose_from_transform, transform_from_pose
 
 Array = NDArray[np.floating]
+
+#: A hand that floats, or one at the end of an arm that stands on the table.
+RobotName = Literal["hand", "panda"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +86,18 @@ T_hand_tcp: Array = transforms.translation([0.0, 0.0, TCP])
 T_hand_grasp: Array = T_hand_tcp @ transforms.invert(T_GRASP_TCP)
 
 
+def tcp_from_hand(position: Sequence[float], quaternion: Sequence[float]) -> quaternions.Vector:
+    """Where the tool centre of a hand at a pose is, metres; it has the hand's axes."""
+    (x, y, z), (i, j, k) = position, quaternions.z_axis(quaternion)
+    return x + TCP * i, y + TCP * j, z + TCP * k
+
+
+def hand_from_tcp(position: Sequence[float], quaternion: Sequence[float]) -> sapien.Pose:
+    """The hand's pose that brings its tool centre to a position, with axes as given."""
+    (x, y, z), (i, j, k) = position, quaternions.z_axis(quaternion)
+    return sapien.Pose([x - TCP * i, y - TCP * j, z - TCP * k], quaternion)
+
+
 @dataclass(frozen=True, kw_only=True)
 class HandControl:
     """Gains of the spring that pulls the hand, and of its fingers.
@@ -107,8 +124,113 @@ _INERTIA = {
 }
 _PAD_FRICTION = 1.2
 
+#: Collision groups of a robot's shapes. They share a bit: none collides with another.
+ROBOT_GROUPS = [1, 1, 1 << 1, 0]
 
-class FloatingHand:
+
+class PandaHand:
+    """A Panda hand: its links and jaws, whatever carries it.
+
+    Args:
+        carrier: the link that it sits on, None if its own root is the articulation's.
+        width: opening of the jaws at the start, metres in [0, 0.08].
+        visuals: whether to load what cameras see.
+        control: gains.
+
+    Attributes:
+        links: first the hand, the left and the right finger; then those of an arm.
+    """
+
+    links: tuple[physx.PhysxArticulationLinkComponent, ...]
+
+    def __init__(
+        self,
+        carrier: physx.PhysxArticulationLinkComponent | None,
+        width: float,
+        *,
+        visuals: bool,
+        control: HandControl,
+    ) -> None:
+        pads = physx.PhysxMaterial(_PAD_FRICTION, _PAD_FRICTION, 0.0)
+        entities = [sapien.Entity() for _ in range(3)]
+        links: list[physx.PhysxArticulationLinkComponent] = []
+        for name, entity in zip(("hand", "left", "right"), entities, strict=True):
+            link = physx.PhysxArticulationLinkComponent(links[0] if links else carrier)
+            for box in HAND_BOXES:
+                if box.link == name:
+                    shape = physx.PhysxCollisionShapeBox(box.half_size, pads)
+                    shape.local_pose = pose_from_transform(box.T_link_box)
+                    shape.set_collision_groups(ROBOT_GROUPS)
+                    link.attach(shape)
+            link.mass = _MASS[name]
+            link.inertia = _INERTIA[name]  # pyright: ignore[reportAttributeAccessIssue]
+            link.cmass_local_pose = sapien.Pose([0, 0, 0.03])
+            link.disable_gravity = True
+            entity.add_component(link)
+            if visuals:
+                entity.add_component(mesh_visual(name))
+            entity.name = link.name = f"panda_{name}"
+            links.append(link)
+        for link, side in zip(links[1:], (1.0, -1.0), strict=True):
+            joint = link.joint
+            joint.type = "prismatic"
+            # A prismatic joint slides along the x axis of its frame: lay it along +y or -y.
+            frame = sapien.Pose(q=[np.sqrt(0.5), 0, 0, side * np.sqrt(0.5)])
+            joint.pose_in_parent = sapien.Pose([0, 0, FINGER_ORIGIN]) * frame
+            joint.pose_in_child = frame
+            joint.limit = np.array([0.0, FINGER_TRAVEL])
+            joint.set_drive_property(
+                control.finger_stiffness, control.finger_damping, control.finger_force
+            )
+            joint.set_drive_target(0.5 * width)
+        self.links = tuple(links)
+        self._hand = links[0]
+        self._hand_entities = tuple(entities)
+        self._fingers = tuple(link.joint for link in links[1:])
+
+    def _couple_jaws(self) -> None:
+        """Makes the fingers move as one; the hand must be in its scene."""
+        self._articulation = self._hand.articulation
+        self._articulation.create_fixed_tendon(
+            list(self.links[:3]), [0, -1, 1], [0, -1, 1], rest_length=0.0, stiffness=1e5
+        )
+
+    def open_jaws(self, width: float = 2 * FINGER_TRAVEL) -> None:
+        """Lets the fingers go to a width, metres."""
+        for joint in self._fingers:
+            joint.set_drive_target(0.5 * width)
+
+    def close_jaws(self) -> None:
+        """Lets the fingers close, on whatever lies between them."""
+        self.open_jaws(0.0)
+
+    def pose(self) -> Array:
+        """``T_world_hand`` (4, 4)."""
+        return transform_from_pose(self.pose_world())
+
+    def tcp_pose(self) -> Array:
+        """``T_world_tcp`` (4, 4)."""
+        return self.pose() @ T_hand_tcp
+
+    def pose_world(self) -> sapien.Pose:
+        """The hand's pose as the simulator has it."""
+        return self._hand.entity_pose
+
+    def linear_velocity(self) -> list[float]:
+        """Of the hand's frame in the world, m/s."""
+        return self._hand.linear_velocity.tolist()
+
+    def angular_velocity(self) -> list[float]:
+        """Of the hand in the world, rad/s."""
+        return self._hand.angular_velocity.tolist()
+
+    def width(self) -> float:
+        """Opening of the jaws, metres."""
+        *_, left, right = self._articulation.qpos.tolist()
+        return left + right
+
+
+class FloatingHand(PandaHand):
     """A Panda hand with a free root, pulled towards a target pose by a six-axis spring.
 
     Args:
@@ -128,52 +250,14 @@ class FloatingHand:
         visuals: bool,
         control: HandControl,
     ) -> None:
-        pads = physx.PhysxMaterial(_PAD_FRICTION, _PAD_FRICTION, 0.0)
-        entities = [sapien.Entity() for _ in range(3)]
-        links: list[physx.PhysxArticulationLinkComponent] = []
-        for name, entity in zip(("hand", "left", "right"), entities, strict=True):
-            link = physx.PhysxArticulationLinkComponent(links[0] if links else None)
-            for box in HAND_BOXES:
-                if box.link == name:
-                    shape = physx.PhysxCollisionShapeBox(box.half_size, pads)
-                    shape.local_pose = pose_from_transform(box.T_link_box)
-                    # One bit shared by the hand's shapes: they never collide with each other.
-                    shape.set_collision_groups([1, 1, 1 << 1, 0])
-                    link.attach(shape)
-            link.mass = _MASS[name]
-            link.inertia = _INERTIA[name]  # pyright: ignore[reportAttributeAccessIssue]
-            link.cmass_local_pose = sapien.Pose([0, 0, 0.03])
-            link.disable_gravity = True
-            entity.add_component(link)
-            if visuals:
-                entity.add_component(_visual_body(name))
-            entity.name = link.name = f"panda_{name}"
-            links.append(link)
-        for link, side in zip(links[1:], (1.0, -1.0), strict=True):
-            joint = link.joint
-            joint.type = "prismatic"
-            # A prismatic joint slides along the x axis of its frame: lay it along +y or -y.
-            frame = sapien.Pose(q=[np.sqrt(0.5), 0, 0, side * np.sqrt(0.5)])
-            joint.pose_in_parent = sapien.Pose([0, 0, FINGER_ORIGIN]) * frame
-            joint.pose_in_child = frame
-            joint.limit = np.array([0.0, FINGER_TRAVEL])
-            joint.set_drive_property(
-                control.finger_stiffness, control.finger_damping, control.finger_force
-            )
-            joint.set_drive_target(0.5 * width)
-        links[0].joint.type = "undefined"  # pyright: ignore[reportAttributeAccessIssue]
-        entities[0].pose = pose_from_transform(T_world_hand)
-        for entity in entities:
+        super().__init__(None, width, visuals=visuals, control=control)
+        self._hand.joint.type = "undefined"  # pyright: ignore[reportAttributeAccessIssue]
+        self._hand_entities[0].pose = pose_from_transform(T_world_hand)
+        for entity in self._hand_entities:
             scene.add_entity(entity)
-        self.links = tuple(links)
-        self._root = links[0]
-        self._fingers = tuple(link.joint for link in links[1:])
-        self._articulation = links[0].articulation
-        self._articulation.create_fixed_tendon(
-            links, [0, -1, 1], [0, -1, 1], rest_length=0.0, stiffness=1e5
-        )
+        self._couple_jaws()
         self._articulation.qpos = np.full(2, 0.5 * width)
-        self._drive = physx.PhysxDriveComponent(links[0])
+        self._drive = physx.PhysxDriveComponent(self._hand)
         self._drive.parent = None  # pyright: ignore[reportAttributeAccessIssue]
         for set_property in (
             self._drive.set_drive_property_x,
@@ -184,33 +268,20 @@ class FloatingHand:
         self._drive.set_drive_property_slerp(
             control.angular_stiffness, control.angular_damping, control.angular_torque
         )
-        entities[0].add_component(self._drive)
-        self.pull_to(entities[0].pose)
+        self._hand_entities[0].add_component(self._drive)
+        self.pull_to(self._hand_entities[0].pose)
 
     def pull_to(self, pose_world: sapien.Pose) -> None:
         """Sets where the spring pulls the hand's frame to."""
         self._drive.set_drive_target(pose_world)
 
-    def open_jaws(self, width: float = 2 * FINGER_TRAVEL) -> None:
-        """Lets the fingers go to a width, metres."""
-        for joint in self._fingers:
-            joint.set_drive_target(0.5 * width)
+    def arm_positions(self) -> list[float]:
+        """Of an arm's joints: a floating hand has none."""
+        return []
 
-    def close_jaws(self) -> None:
-        """Lets the fingers close, on whatever lies between them."""
-        self.open_jaws(0.0)
-
-    def pose(self) -> Array:
-        """``T_world_hand`` (4, 4)."""
-        return transform_from_pose(self._root.entity_pose)
-
-    def velocity(self) -> Array:
-        """(6,): linear m/s and angular rad/s of the hand, world frame."""
-        return np.concatenate([self._root.linear_velocity, self._root.angular_velocity])
-
-    def width(self) -> float:
-        """Opening of the jaws, metres."""
-        return float(self._articulation.qpos.sum())
+    def arm_velocities(self) -> list[float]:
+        """Of an arm's joints: a floating hand has none."""
+        return []
 
 
 @functools.cache
@@ -233,14 +304,15 @@ def panda_meshes() -> Path:
 @functools.cache
 def _visual_shape(name: str) -> sapien.render.RenderShapeTriangleMesh:
     """The mesh of one link, loaded once a process."""
-    file = "hand.glb" if name == "hand" else "finger.glb"
-    shape = sapien.render.RenderShapeTriangleMesh(str(panda_meshes() / file))
+    mesh = "finger" if name in ("left", "right") else name
+    shape = sapien.render.RenderShapeTriangleMesh(str(panda_meshes() / f"{mesh}.glb"))
     if name == "right":
         shape.local_pose = sapien.Pose(q=[0, 0, 0, 1])
     return shape
 
 
-def _visual_body(name: str) -> sapien.render.RenderBodyComponent:
+def mesh_visual(name: str) -> sapien.render.RenderBodyComponent:
+    """What cameras see of a link: "hand", "left", "right", or "link0" to "link7" of an arm."""
     body = sapien.render.RenderBodyComponent()
     body.attach(_visual_shape(name).clone())
     return body

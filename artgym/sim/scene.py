@@ -7,15 +7,17 @@ costs about a millisecond.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import sapien
 from numpy.typing import NDArray
 from sapien import physx
 
+from artgym.geometry import quaternions
 from artgym.geometry.transforms import transform_from
 from artgym.objects.contents import Image
 from artgym.objects.model import (
@@ -36,7 +38,7 @@ from artgym.sim.conversion import (
     poses_from_transforms,
     transform_from_pose,
 )
-from artgym.sim.robots import FloatingHand, HandControl
+from artgym.sim.robots import FloatingHand, HandControl, tcp_from_hand
 from artgym.sim.surfaces import Surface, flat_surface, piece_surface
 
 Array = NDArray[np.floating]
@@ -62,6 +64,59 @@ class PhysicsConfig:
     timestep: float = 1.0 / 120.0
     position_iterations: int = 15
     hand: HandControl = field(default_factory=HandControl)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlacedObject:
+    """An object somewhere in the world.
+
+    Attributes:
+        model: the object.
+        T_world_object: pose (4, 4) of its root.
+        q: its joint positions (K - 1,).
+    """
+
+    model: ArticulatedObject
+    T_world_object: Array
+    q: Array
+
+
+class Reading(NamedTuple):
+    """What a scene says of its hand and of one part at one instant, in plain floats.
+
+    World frame, metres, radians, seconds; quaternions wxyz.
+    """
+
+    tcp_position: quaternions.Vector
+    hand_quaternion: list[float]
+    linear_velocity: list[float]
+    angular_velocity: list[float]
+    jaw_width: float
+    q: list[float]
+    velocities: list[float]
+    part_position: list[float]
+    part_quaternion: list[float]
+    arm_positions: list[float]
+    arm_velocities: list[float]
+
+    def is_sound(self, fastest: float, farthest: float) -> bool:
+        """Whether all is finite, no joint or hand faster and the hand no farther than given.
+
+        Metres and radians, a second.
+        """
+        speeds = (
+            *self.velocities,
+            *self.linear_velocity,
+            *self.angular_velocity,
+            *self.arm_velocities,
+        )
+        # NaN is on neither side of anything.
+        return (
+            all([-fastest < v < fastest for v in speeds])
+            and all([-farthest < v < farthest for v in self.tcp_position])
+            and all([-farthest < v < farthest for v in self.part_position])
+            and all([-math.inf < v < math.inf for v in self.q])
+        )
 
 
 @dataclass(frozen=True)
@@ -130,7 +185,7 @@ class ArticulatedBody:
         # The simulator counts q from the rest state, where all link frames coincide.
         self._offset = obj.rest_positions
         self._articulation.qpos = np.asarray(q, dtype=float) - self._offset
-        self._damping = np.array([joint.damping for joint in obj.joints])
+        self._resistance = np.array([-joint.damping for joint in obj.joints])
 
     def positions(self) -> Array:
         """Joint positions (K - 1,), metres or radians."""
@@ -142,7 +197,13 @@ class ArticulatedBody:
 
     def push(self, efforts: Array) -> None:
         """Applies joint efforts (K - 1,), N or N m, during the coming step."""
-        self._articulation.qf = efforts - self._damping * self._articulation.qvel
+        self._articulation.qf = efforts + self._resistance * self._articulation.qvel
+
+    def resist(self) -> None:
+        """Applies the joints' damping, and nothing else, during the coming step."""
+        # An effort, even of nothing, would wake what sleeps.
+        if not self.links[0].sleeping:
+            self._articulation.qf = self._resistance * self._articulation.qvel
 
     def link_poses(self) -> Array:
         """``Ts_world_link`` (K, 4, 4)."""
@@ -150,7 +211,7 @@ class ArticulatedBody:
 
 
 class ManipulationScene:
-    """A table, one object, and a floating hand unless ``T_world_hand`` is None.
+    """A table, one object, others beside it, and a floating hand unless there is no start for it.
 
     Args:
         obj: the object.
@@ -162,6 +223,7 @@ class ManipulationScene:
         render_system: shared renderer; without one the scene has nothing to be seen.
         table_material: how the table looks.
         joint_creep: share of its range by which a held joint may creep, a second.
+        others: objects beside it, which keep clear of one another.
     """
 
     def __init__(
@@ -176,6 +238,7 @@ class ManipulationScene:
         render_system: sapien.render.RenderSystem | None = None,
         table_material: Material | None = None,
         joint_creep: float = JOINT_CREEP,
+        others: Sequence[PlacedObject] = (),
     ) -> None:
         self.config = config
         systems: list[sapien.System] = [physx.PhysxCpuSystem()]
@@ -186,15 +249,22 @@ class ManipulationScene:
         self._system.timestep = config.timestep
         visuals = render_system is not None
         self._add_table(table_material if visuals else None)
-        self.body = ArticulatedBody(
-            self.sapien_scene,
-            obj,
-            T_world_object,
-            q,
-            visuals=visuals,
-            position_iterations=config.position_iterations,
-            joint_creep=joint_creep,
+        placed = PlacedObject(model=obj, T_world_object=T_world_object, q=np.asarray(q))
+        self.bodies = tuple(
+            ArticulatedBody(
+                self.sapien_scene,
+                each.model,
+                each.T_world_object,
+                each.q,
+                visuals=visuals,
+                position_iterations=config.position_iterations,
+                joint_creep=joint_creep,
+                group=group,
+            )
+            for group, each in enumerate((placed, *others))
         )
+        #: The object that the scene is about.
+        self.body = self.bodies[0]
         self.hand: FloatingHand | None = None
         self._hand_links: dict[physx.PhysxRigidBaseComponent, int] = {}
         if T_world_hand is not None:
@@ -220,8 +290,30 @@ class ManipulationScene:
     def step(self, count: int = 1) -> None:
         """Advances physics by ``count`` steps."""
         for _ in range(count):
-            self.body.push(np.zeros(len(self.body.links) - 1))
+            for body in self.bodies:
+                body.resist()
             self._system.step()
+
+    def read(self, part: int) -> Reading:
+        """The hand and a part as they are now."""
+        hand = self.hand
+        assert hand is not None
+        pose = hand.pose_world()
+        quaternion = pose.q.tolist()
+        part_pose = self.body.links[part].entity_pose
+        return Reading(
+            tcp_from_hand(pose.p.tolist(), quaternion),
+            quaternion,
+            hand.linear_velocity(),
+            hand.angular_velocity(),
+            hand.width(),
+            self.body.positions().tolist(),
+            self.body.velocities().tolist(),
+            part_pose.p.tolist(),
+            part_pose.q.tolist(),
+            hand.arm_positions(),
+            hand.arm_velocities(),
+        )
 
     def contact(self, part: int) -> PartContact:
         """How the hand touches a part, from the last step's contacts."""

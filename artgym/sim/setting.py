@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
 from artgym.geometry.transforms import transform_from
-from artgym.objects.model import ArticulatedObject, Material, Texture
+from artgym.objects.model import Material, Texture
 
 Array = NDArray[np.floating]
 
@@ -40,15 +40,19 @@ def random_placement(rng: np.random.Generator) -> Array:
     return transform_from(matrix_from_axis_angle([0.0, 0.0, yaw]), [*shift, 0.0])
 
 
-def random_hand_start(rng: np.random.Generator, obj: ArticulatedObject) -> Array:
+def random_hand_start(rng: np.random.Generator, highest: Array) -> Array:
     """``T_world_tcp`` (4, 4) of a hand that points down, clear of the object.
 
     Above the object and in front of its middle; well in front of what is taller than a hand's
     reach above a table.
+
+    Args:
+        rng: what it is drawn from.
+        highest: (3,) the upper corner of the object's box, object frame, metres.
     """
     rotation = frame_from_z([0.0, 0.0, -1.0], rng.uniform(-np.pi / 2, np.pi / 2))
     position = rng.uniform([0.05, -0.2, 0.62], [0.25, 0.2, 0.72])
-    front, _, top = obj.rest_bounds[1]
+    front, _, top = highest
     if top > _TALL:
         position += [max(0.0, front + _CLEARANCE), 0.0, 0.2]
     else:

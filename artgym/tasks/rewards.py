@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
-
-import numpy as np
 
 from artgym.tasks.success import TRAVEL_THRESHOLD, Progress
 
@@ -17,17 +16,20 @@ REACH, GRIP, MOVE = 0.2, 0.2, 0.6
 _REACH_SCALE = 0.2
 
 
-def dense_terms(distance: float, pinched: bool, progress: Progress) -> dict[str, float]:
+def dense_terms(
+    distance: float, pinched: bool, progress: Progress, direction: float
+) -> dict[str, float]:
     """The terms of the dense reward.
 
     Args:
         distance: from the tool centre to the part's grip point, metres.
         pinched: the part is between the fingers now.
         progress: the joint's motion; only motion made in contact counts.
+        direction: 1 to open, -1 to close.
     """
-    moved = min(float(progress.travel) / TRAVEL_THRESHOLD, 1.0)
+    moved = min(max(float(progress.headway(direction)) / TRAVEL_THRESHOLD, 0.0), 1.0)
     return {
-        "reach": REACH * (1.0 - float(np.tanh(distance / _REACH_SCALE))),
+        "reach": REACH * (1.0 - math.tanh(distance / _REACH_SCALE)),
         "grip": GRIP * float(pinched),
         "move": MOVE * moved * float(progress.engaged),
     }

@@ -64,6 +64,10 @@ class Progress:
         """Distance from the start, as a share of the range."""
         return abs(self.fraction - self.start)
 
+    def headway(self, direction: float) -> Any:
+        """Distance from the start towards open (direction 1) or closed (-1); negative back."""
+        return direction * (self.fraction - self.start)
+
     @property
     def engaged(self) -> Any:
         """Share of the motion made while touching the part; 0 before any motion."""

@@ -15,8 +15,10 @@ import gymnasium
 import numpy as np
 
 import artgym  # noqa: F401
+from artgym.envs.observations import IMAGE_MODES, OBS_MODES
 
-OBS_MODES = ("state", "rgbd", "pointcloud")
+__all__ = ["IMAGE_MODES", "OBS_MODES", "digest", "make"]
+
 #: Small pictures and clouds keep the tests fast. Stable-Baselines3 wants 36 pixels.
 SMALL = {"camera_size": (64, 48), "num_points": 256}
 STEPS = 200

@@ -21,8 +21,8 @@ ROUNDING = 1e-6
 
 
 def fields(observation):
-    ends = np.cumsum(list(STATE_FIELDS.values()))
-    return dict(zip(STATE_FIELDS, np.split(observation, ends[:-1]), strict=True))
+    ends = np.cumsum(list(STATE_FIELDS["hand"].values()))
+    return dict(zip(STATE_FIELDS["hand"], np.split(observation, ends[:-1]), strict=True))
 
 
 def require_idle_does_nothing(ids, steps):

@@ -16,7 +16,7 @@ def progress(travel: float, engaged: float) -> Progress:
 
 def dense(distance: float, pinched: bool, travel: float, engaged: float) -> float:
     state = progress(travel, engaged)
-    return reward("dense", dense_terms(distance, pinched, state), state)
+    return reward("dense", dense_terms(distance, pinched, state, 1.0), state)
 
 
 def test_weights_add_up_to_one():
@@ -47,4 +47,12 @@ def test_motion_without_contact_pays_nothing():
 @pytest.mark.parametrize(("travel", "engaged", "expected"), [(0.6, 1.0, 1.0), (0.6, 0.5, 0.0)])
 def test_sparse_is_success(travel, engaged, expected):
     state = progress(travel, engaged)
-    assert reward("sparse", dense_terms(0.0, True, state), state) == expected
+    assert reward("sparse", dense_terms(0.0, True, state, 1.0), state) == expected
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_only_the_asked_direction_pays(direction):
+    there = Progress(0.5, 0.5 + 0.3 * direction, 0.3, 0.3, 0.3)
+    back = Progress(0.5, 0.5 - 0.3 * direction, 0.3, 0.3, 0.3)
+    assert dense_terms(0.1, True, there, direction)["move"] == pytest.approx(0.6 * MOVE)
+    assert dense_terms(0.1, True, back, direction)["move"] == 0.0

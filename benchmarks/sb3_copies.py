@@ -1,0 +1,84 @@
+"""Our vector environments as Stable-Baselines3 takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+
+class Sb3Copies(VecEnv):
+    """Copies of an environment, stepped together in a few processes.
+
+    Args:
+        env_id: of the environment.
+        count: copies.
+        workers: processes; 0 steps them in this one.
+        seed: of the first reset.
+        made_with: arguments of the copies.
+    """
+
+    def __init__(self, env_id: str, count: int, workers: int, seed: int, **made_with: Any) -> None:
+        self._envs = gymnasium.make_vec(
+            env_id,
+            num_envs=count,
+            workers=workers,
+            autoreset_mode=AutoresetMode.SAME_STEP,
+            **made_with,
+        )
+        self._first_seed: int | None = seed
+        self._answer: tuple[Any, ...] = ()
+        self._action: Any = None
+        super().__init__(count, self._envs.single_observation_space, self._envs.single_action_space)
+
+    def reset(self) -> Any:
+        """First observations of all copies; later resets go on from the first one's seed."""
+        observations, _ = self._envs.reset(seed=self._first_seed)
+        self._first_seed = None
+        return observations
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keeps the actions for ``step_wait``."""
+        self._action = actions
+
+    def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Steps all copies; the infos hold what an episode's end was like, and nothing else."""
+        observations, rewards, terminated, truncated, info = self._envs.step(self._action)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        done = terminated | truncated
+        for i in np.flatnonzero(done):
+            infos[i] = {
+                **info["final_info"][i],
+                "terminal_observation": info["final_obs"][i],
+                "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
+            }
+        return observations, rewards.astype(np.float32), done, infos
+
+    def close(self) -> None:
+        """Ends the workers."""
+        self._envs.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of every copy."""
+        if attr_name == "render_mode":
+            return [self._envs.render_mode] * self.num_envs
+        return list(self._envs.call(attr_name))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused: copies are what they were made with."""
+        raise AttributeError(f"{attr_name}: make new environments with the arguments you want.")
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """What a method of every copy gives."""
+        return list(self._envs.call(method_name, *method_args))
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> Sequence[bool]:
+        """Never."""
+        return [False] * self.num_envs
