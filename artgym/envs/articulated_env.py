@@ -366,7 +366,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             generator=copy.deepcopy(generator),
             options=dict(options),
             actions=np.array(self._actions).reshape(-1, *self.action_space.shape),
-            cloud_generator=copy.deepcopy(self._observer.rng.bit_generator.state),
+            cloud_generator=copy.deepcopy(self._observer.generator_before),
         )
 
     def set_state(self, state: Snapshot) -> tuple[Any, dict[str, Any]]:
@@ -397,11 +397,8 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             contact = self._advance(numbers)
         if contact is None:
             raise InvalidArgumentError("set_state(): the actions of this state end in a blow-up.")
-        self._observer.rng.bit_generator.state = copy.deepcopy(state.cloud_generator)
-        observation = self._observe()
-        # As if it had not been observed once more.
-        self._observer.rng.bit_generator.state = copy.deepcopy(state.cloud_generator)
-        return observation, self._report(contact)
+        self._observer.restore_generator(state.cloud_generator)
+        return self._observe(), self._report(contact)
 
     # -- what tasks may change -----------------------------------------------------------------
 

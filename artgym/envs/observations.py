@@ -7,6 +7,7 @@ without complaint: ``depth`` is the picture row by row, a transform its 16 numbe
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -152,7 +153,9 @@ class Observer:
         rng: np.random.Generator,
     ) -> None:
         self.config = config
-        self.rng = rng
+        self._rng = rng
+        #: State of the generator when the last observation was begun.
+        self.generator_before = rng.bit_generator.state
         self._scene = scene
         self._part = target_part
         self._views = tuple(views)
@@ -174,6 +177,10 @@ class Observer:
         x, y, z = quaternions.rotate(reading.part_quaternion, self._grip_point_part)
         a, b, c = reading.part_position
         return a + x, b + y, c + z
+
+    def restore_generator(self, state: Mapping[str, Any]) -> None:
+        """Makes the next observation draw as the one did that began with this state."""
+        self._rng.bit_generator.state = copy.deepcopy(dict(state))
 
     def observe(
         self, reading: Reading, grip_point: quaternions.Vector, open_fraction: float
@@ -197,6 +204,7 @@ class Observer:
             "target_part": np.int64(self._part),
         }
         if mode == "pointcloud":
+            self.generator_before = self._rng.bit_generator.state
             return observation | self._cloud()
         for i, camera in enumerate(self._cameras):
             observation |= {of_camera(n, i): v for n, v in self._picture(camera).items()}
@@ -264,6 +272,6 @@ class Observer:
         seen = np.flatnonzero(hits.body >= 0)
         if not len(seen):
             return {"points": np.tile(eye, count).astype(np.float32)}
-        chosen = self.rng.choice(seen, count, replace=len(seen) < count)
+        chosen = self._rng.choice(seen, count, replace=len(seen) < count)
         points = eye + hits.distance[chosen, None] * directions[chosen]
         return {"points": points.astype(np.float32).reshape(-1)}

@@ -22,7 +22,8 @@ class Snapshot:
         generator: state of its random generator before the reset.
         options: of that reset.
         actions: (n, A) float64, all that was done since.
-        cloud_generator: state of the generator that draws the points of clouds, now.
+        cloud_generator: state of the generator that draws the points of clouds, before the last
+            observation.
     """
 
     environment: tuple[str, Mapping[str, Any]]
