@@ -21,6 +21,7 @@ from artgym.geometry import quaternions, transforms
 from artgym.objects.model import ArticulatedObject
 from artgym.sim import rays
 from artgym.sim.camera import RenderedCamera, View
+from artgym.sim.masks import MaskCodes
 from artgym.sim.robots import RobotName
 from artgym.sim.scene import ManipulationScene, Reading
 
@@ -164,6 +165,13 @@ class Observer:
             if config.mode in IMAGE_MODES
             else []
         )
+        self._codes = MaskCodes(num_parts=tuple(body.model.num_parts for body in scene.bodies))
+        if config.mode == "pointcloud":
+            self._cloud_camera = rays.PointCloudCamera(views[0], config.num_points)
+            self._ray_bodies = [
+                *(rays.link_body(link) for body in scene.bodies for link in body.model.links),
+                *rays.robot_bodies(config.robot),
+            ]
         joint = obj.joint_of(target_part)
         self._grip_point_part: list[float] = obj.grip_point(target_part).tolist()
         size = np.ptp(obj.links[target_part].bounds(), axis=0)
@@ -244,34 +252,25 @@ class Observer:
         return {name: piece.copy() for name, piece in zip(sizes, pieces, strict=True)}
 
     def _picture(self, camera: RenderedCamera) -> dict[str, Any]:
-        rgb, depth = camera.take()
         found: dict[str, Any] = {
-            "rgb": rgb,
             "intrinsics": camera.view.intrinsics.astype(np.float32).reshape(-1),
             "T_world_camera": camera.view.T_world_camera.astype(np.float32).reshape(-1),
         }
+        if self.config.segmentation:
+            rgb, depth, bodies = camera.take_with_bodies(self._scene.links())
+            found["segmentation"] = self._codes.mask_from_bodies(bodies).reshape(-1)
+        else:
+            rgb, depth = camera.take()
+        found["rgb"] = rgb
         if self.config.mode == "rgbd":
             found["depth"] = depth.reshape(-1)
         return found
 
     def _cloud(self) -> dict[str, Any]:
-        """Points that the cameras see, the table left out, world frame, flattened."""
-        scene, view, count = self._scene, self._views[0], self.config.num_points
-        assert scene.hand is not None
-        width, height = view.width // 2, view.height // 2
-        intrinsics = view.intrinsics * [[0.5], [0.5], [1.0]]
-        bodies = [
-            *(rays.link_body(link) for body in scene.bodies for link in body.model.links),
-            *rays.hand_bodies(),
-        ]
-        hand_poses = rays.hand_poses(scene.hand.pose(), scene.hand.width())
-        poses = np.concatenate([*(body.link_poses() for body in scene.bodies), hand_poses])
-        directions = rays.camera_rays(intrinsics, width, height, view.T_world_camera)
-        eye = view.T_world_camera[:3, 3]
-        hits = rays.cast(bodies, poses, eye, directions)
-        seen = np.flatnonzero(hits.body >= 0)
-        if not len(seen):
-            return {"points": np.tile(eye, count).astype(np.float32)}
-        chosen = self._rng.choice(seen, count, replace=len(seen) < count)
-        points = eye + hits.distance[chosen, None] * directions[chosen]
-        return {"points": points.astype(np.float32).reshape(-1)}
+        """Points that the first camera sees, the table left out, world frame, flattened."""
+        poses = self._scene.link_poses()
+        points, bodies = self._cloud_camera.cloud(self._ray_bodies, poses, self._rng)
+        found: dict[str, Any] = {"points": points.reshape(-1)}
+        if self.config.segmentation:
+            found["segmentation"] = self._codes.mask_from_bodies(bodies)
+        return found

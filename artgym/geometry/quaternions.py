@@ -55,3 +55,35 @@ def rotate(q: Sequence[float], v: Sequence[float]) -> Vector:
         b + 2.0 * (z * i - x * k),
         c + 2.0 * (x * j - y * i),
     )
+
+
+def quaternion_from_rows(rows: Sequence[Sequence[float]]) -> Quaternion:
+    """The unit quaternion, w >= 0, of a rotation matrix given by its rows."""
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    # Four times the squared components; the largest one is the well-conditioned choice.
+    squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
+    best = squares.index(max(squares))
+    w, x, y, z = (
+        (squares[0], h - f, c - g, d - b),
+        (h - f, squares[1], d + b, c + g),
+        (c - g, d + b, squares[2], h + f),
+        (d - b, c + g, h + f, squares[3]),
+    )[best]
+    scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+    if w < 0:
+        scale = -scale
+    return scale * w, scale * x, scale * y, scale * z
+
+
+def rows_from_quaternion(q: Sequence[float]) -> tuple[Vector, Vector, Vector]:
+    """The rows of the rotation matrix of a quaternion, normalised here."""
+    w, x, y, z = q
+    scale = 2.0 / (w * w + x * x + y * y + z * z)
+    sx, sy, sz = scale * x, scale * y, scale * z
+    xx, xy, xz, yy, yz, zz = sx * x, sx * y, sx * z, sy * y, sy * z, sz * z
+    wx, wy, wz = sx * w, sy * w, sz * w
+    return (
+        (1.0 - yy - zz, xy - wz, xz + wy),
+        (xy + wz, 1.0 - xx - zz, yz - wx),
+        (xz - wy, yz + wx, 1.0 - xx - yy),
+    )

@@ -20,6 +20,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry import transforms
+from artgym.geometry.rotations import quaternion_from_matrix
 from artgym.geometry.screw import JointType, joint_motion
 from artgym.objects.contents import Image, TriangleMesh
 
@@ -305,6 +306,19 @@ class Link:
             total += mass * (R @ shape.geometry.unit_inertia @ R.T)
             total += mass * (d @ d * np.eye(3) - np.outer(d, d))
         return total
+
+    @cached_property
+    def principal_inertia(self) -> tuple[Array, Array]:
+        """Moments (3,) about the principal axes, and those axes' quaternion (4,) in the link."""
+        moments, axes = np.linalg.eigh(self.inertia)
+        if np.linalg.det(axes) < 0:
+            axes[:, 0] *= -1
+        return moments, quaternion_from_matrix(axes)
+
+    @cached_property
+    def shape_quaternions(self) -> Array:
+        """Orientations (n, 4) of the shapes in the link."""
+        return quaternion_from_matrix(np.array([shape.rotation for shape in self.shapes]))
 
     @cached_property
     def _bounds(self) -> Array:

@@ -5,6 +5,7 @@ Pictures come in the OpenCV convention; depth is metres along z, 0 where nothing
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from numpy.typing import NDArray
 from artgym.geometry.camera import intrinsics_from_fov, look_at
 from artgym.objects.model import ArticulatedObject
 from artgym.sim.conversion import R_SIMCAM_CAMERA, pose_from_transform
+from artgym.sim.masks import NOTHING, TABLE
+from artgym.sim.renderer import ShaderName, use_shader
 
 Array = NDArray[np.floating]
 
@@ -106,10 +109,17 @@ class ViewDistribution:
 
 
 class RenderedCamera:
-    """A camera in a scene that has a renderer."""
+    """A camera in a scene that has a renderer.
 
-    def __init__(self, scene: sapien.Scene, view: View) -> None:
+    Args:
+        scene: what it sees.
+        view: where it is.
+        shader: how it draws, see ``renderer.ShaderName``.
+    """
+
+    def __init__(self, scene: sapien.Scene, view: View, shader: ShaderName = "fast") -> None:
         self.view = view
+        use_shader(shader)
         self._camera = sapien.render.RenderCameraComponent(view.width, view.height)
         self._camera.set_fovy(view.fov_y, compute_x=True)
         self._camera.near, self._camera.far = NEAR, FAR
@@ -125,12 +135,33 @@ class RenderedCamera:
 
     def take(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """RGB (h, w, 3) and depth (h, w) of the scene as it stands."""
+        rgb, depth, _ = self._shoot()
+        return rgb, depth
+
+    def take_with_bodies(
+        self, bodies: Sequence[sapien.Component]
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
+        """The same, and the body map (h, w) of that picture; see ``masks``.
+
+        Args:
+            bodies: links of the objects and of the robot, in the order of the map's indices. What
+                is seen of anything else becomes ``TABLE``.
+        """
+        rgb, depth, entity = self._shoot()
+        ids = np.array([body.entity.per_scene_id for body in bodies], dtype=np.intp)
+        index = np.full(max(entity.max(), ids.max(initial=0)) + 1, TABLE, dtype=np.int32)
+        index[ids] = np.arange(len(ids))
+        return rgb, depth, np.where(depth > 0.0, index[entity], NOTHING)
+
+    def _shoot(
+        self,
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.integer]]:
+        """RGB, depth, and ``per_scene_id`` (h, w) of the entity each pixel shows."""
         self._scene.update_render()
         self._camera.take_picture()
-        color = self._camera.get_picture("Color")[..., :3]
-        rgb = (np.clip(color, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+        rgb = np.ascontiguousarray(self._camera.get_picture("Color")[..., :3])
         # Positions come in integer millimetres, the camera looking along -z.
-        position_mm = self._camera.get_picture("PositionSegmentation")
-        depth = position_mm[..., 2].astype(np.float32) * np.float32(-1e-3)
+        position_mm_entity = self._camera.get_picture("PositionSegmentation")
+        depth = position_mm_entity[..., 2].astype(np.float32) * np.float32(-1e-3)
         depth[(depth < NEAR) | (depth > FAR)] = 0.0
-        return rgb, depth
+        return rgb, depth, position_mm_entity[..., 3]

@@ -6,7 +6,8 @@ import numpy as np
 import sapien
 from numpy.typing import NDArray
 
-from artgym.geometry.rotations import matrix_from_quaternion, quaternion_from_matrix
+from artgym.geometry import quaternions
+from artgym.geometry.rotations import quaternion_from_matrix
 
 Array = NDArray[np.floating]
 
@@ -17,8 +18,8 @@ R_SIMCAM_CAMERA: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0
 
 def pose_from_transform(T_a_b: Array) -> sapien.Pose:
     """A simulator pose from ``T_a_b`` (4, 4)."""
-    position, quaternion = T_a_b[:3, 3], quaternion_from_matrix(T_a_b[:3, :3])
-    return sapien.Pose(position, quaternion)  # pyright: ignore[reportArgumentType]
+    quaternion = quaternions.quaternion_from_rows(T_a_b[:3, :3].tolist())
+    return sapien.Pose(T_a_b[:3, 3], quaternion)  # pyright: ignore[reportArgumentType]
 
 
 def poses_from_transforms(Ts_a_b: Array) -> list[sapien.Pose]:
@@ -29,7 +30,6 @@ def poses_from_transforms(Ts_a_b: Array) -> list[sapien.Pose]:
 
 def transform_from_pose(pose: sapien.Pose) -> Array:
     """``T_a_b`` (4, 4) in double precision from a simulator pose."""
-    T = np.eye(4)
-    T[:3, :3] = matrix_from_quaternion(pose.q)
-    T[:3, 3] = pose.p
-    return T
+    x, y, z = pose.p.tolist()
+    a, b, c = quaternions.rows_from_quaternion(pose.q.tolist())
+    return np.array(((*a, x), (*b, y), (*c, z), (0.0, 0.0, 0.0, 1.0)))

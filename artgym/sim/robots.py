@@ -156,12 +156,11 @@ class PandaHand:
         links: list[physx.PhysxArticulationLinkComponent] = []
         for name, entity in zip(("hand", "left", "right"), entities, strict=True):
             link = physx.PhysxArticulationLinkComponent(links[0] if links else carrier)
-            for box in HAND_BOXES:
-                if box.link == name:
-                    shape = physx.PhysxCollisionShapeBox(box.half_size, pads)
-                    shape.local_pose = pose_from_transform(box.T_link_box)
-                    shape.set_collision_groups(ROBOT_GROUPS)
-                    link.attach(shape)
+            for half_size, pose in _placed_boxes(name):
+                shape = physx.PhysxCollisionShapeBox(half_size, pads)
+                shape.local_pose = pose
+                shape.set_collision_groups(ROBOT_GROUPS)
+                link.attach(shape)
             link.mass = _MASS[name]
             link.inertia = _INERTIA[name]  # pyright: ignore[reportAttributeAccessIssue]
             link.cmass_local_pose = sapien.Pose([0, 0, 0.03])
@@ -282,6 +281,13 @@ class FloatingHand(PandaHand):
     def arm_velocities(self) -> list[float]:
         """Of an arm's joints: a floating hand has none."""
         return []
+
+
+@functools.cache
+def _placed_boxes(link: str) -> tuple[tuple[tuple[float, float, float], sapien.Pose], ...]:
+    """Half sizes and poses of a link's collision boxes."""
+    boxes = [box for box in HAND_BOXES if box.link == link]
+    return tuple((box.half_size, pose_from_transform(box.T_link_box)) for box in boxes)
 
 
 @functools.cache

@@ -167,7 +167,7 @@ class ArticulatedBody:
             else:
                 body.joint.name = joint.name
                 body.joint.type = "revolute_unwrapped" if joint.type == "revolute" else "prismatic"
-                frame = pose_from_transform(_joint_frame(joint.axis, joint.pivot))
+                frame = _joint_frame(joint.axis, joint.pivot)
                 body.joint.pose_in_parent = body.joint.pose_in_child = frame
                 low, high = sorted((joint.closed, joint.open))
                 body.joint.limit = np.array([low, high]) - joint.closed
@@ -315,6 +315,15 @@ class ManipulationScene:
             hand.arm_velocities(),
         )
 
+    def links(self) -> list[physx.PhysxArticulationLinkComponent]:
+        """Links of the objects, one object after another, and of the robot: see ``masks``."""
+        robot = self.hand.links if self.hand is not None else ()
+        return [*(link for body in self.bodies for link in body.links), *robot]
+
+    def link_poses(self) -> Array:
+        """``Ts_world_link`` (n, 4, 4) of ``links``."""
+        return np.stack([transform_from_pose(link.entity_pose) for link in self.links()])
+
     def contact(self, part: int) -> PartContact:
         """How the hand touches a part, from the last step's contacts."""
         assert self.hand is not None
@@ -347,13 +356,15 @@ class ManipulationScene:
         self.sapien_scene.clear()
 
 
-def _joint_frame(axis: Sequence[float], pivot: Sequence[float]) -> Array:
+@functools.lru_cache(maxsize=1024)
+def _joint_frame(axis: Vector, pivot: Vector) -> sapien.Pose:
     """A frame at the pivot whose x is the joint's axis: the simulator's convention."""
     x = np.asarray(axis, dtype=float)
     helper = np.eye(3)[np.argmin(np.abs(x))]
     y = np.cross(x, helper)
     y = y / np.linalg.norm(y)
-    return transform_from(np.stack([x, y, np.cross(x, y)], axis=-1), pivot)
+    R = np.stack([x, y, np.cross(x, y)], axis=-1)
+    return pose_from_transform(transform_from(R, pivot))
 
 
 def _surface(friction: float) -> physx.PhysxMaterial:
@@ -376,19 +387,16 @@ def _collision_shape(
 
 def _attach_shapes(body: physx.PhysxArticulationLinkComponent, link: Link, group: int) -> None:
     material = _surface(link.friction)
-    poses = poses_from_transforms(np.stack([piece.T_link_shape for piece in link.shapes]))
-    for piece, pose in zip(link.shapes, poses, strict=True):
+    for piece, quaternion in zip(link.shapes, link.shape_quaternions, strict=True):
         shape = _collision_shape(piece.geometry, material)
-        shape.local_pose = pose
+        shape.local_pose = sapien.Pose(piece.position, quaternion)
         # Links of one object share a bit and never collide with each other.
         shape.set_collision_groups([1, 1, 1 << 2, group])
         body.attach(shape)
-    moments, axes = np.linalg.eigh(link.inertia)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
+    moments, quaternion = link.principal_inertia
     body.mass = link.mass
     body.inertia = moments  # pyright: ignore[reportAttributeAccessIssue]
-    body.cmass_local_pose = pose_from_transform(transform_from(axes, link.center_of_mass))
+    body.cmass_local_pose = sapien.Pose(link.center_of_mass, quaternion)  # pyright: ignore[reportArgumentType]
 
 
 def link_visual(link: Link) -> sapien.render.RenderBodyComponent:

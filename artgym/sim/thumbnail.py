@@ -56,7 +56,7 @@ def thumbnail(
     scene = ManipulationScene(obj, np.eye(4), q, render_system=render_system())
     _add_ground(scene.sapien_scene)
     _add_lights(scene.sapien_scene, float(np.linalg.norm(np.ptp(obj.rest_bounds, axis=0))))
-    rgb, depth = RenderedCamera(scene.sapien_scene, view).take()
+    rgb, depth = RenderedCamera(scene.sapien_scene, view, shader="shadows").take()
     scene.close()
     # Beyond the camera's range the ground goes on as bright as where nothing shades it.
     points_camera = points_from_depth(depth, view.intrinsics)

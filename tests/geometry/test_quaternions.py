@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from artgym.geometry import quaternions
-from artgym.geometry.rotations import matrix_from_axis_angle, matrix_from_quaternion
+from artgym.geometry.rotations import (
+    matrix_from_axis_angle,
+    matrix_from_quaternion,
+    quaternion_from_matrix,
+)
 
 SCALES = (1.0, 1e-3, 1e-7, 0.0)
 
@@ -31,3 +35,14 @@ def test_product_axes_and_rotation(rng):
     np.testing.assert_allclose(quaternions.z_axis(a), R_a[:, 2], atol=1e-12)
     v = rng.normal(size=3)
     np.testing.assert_allclose(quaternions.rotate(a, v), R_a @ v, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, np.pi - 1e-9, np.pi])
+def test_matrices(rng, angle):
+    axis = rng.normal(size=3)
+    R = matrix_from_axis_angle(angle * axis / np.linalg.norm(axis))
+    q = quaternions.quaternion_from_rows(R.tolist())
+    np.testing.assert_allclose(q, quaternion_from_matrix(R), atol=1e-12)
+    np.testing.assert_allclose(quaternions.rows_from_quaternion(q), R, atol=1e-12)
+    double = [2.0 * each for each in q]
+    np.testing.assert_allclose(quaternions.rows_from_quaternion(double), R, atol=1e-12)
