@@ -21,6 +21,8 @@ Array = NDArray[np.floating]
 
 #: Largest move of the hand in one control step: metres and radians at an action of 1.
 MAX_TRANSLATION, MAX_ROTATION = 0.02, 0.1
+#: Largest turn of an arm's joint in one control step, radians.
+MAX_JOINT_TURN = 0.1
 #: Jaw opening at an action of +1, metres; -1 closes them.
 MAX_WIDTH = 0.08
 

@@ -83,6 +83,8 @@ def try_grasp(
     part: int,
     T_object_grasp: Array,
     config: TrialConfig = TrialConfig(),
+    *,
+    T_object_base: Array | None = None,
 ) -> Trial:
     """Tries one grasp of a part, the object standing on a table.
 
@@ -94,6 +96,11 @@ def try_grasp(
         part: index of the part to move.
         T_object_grasp: the grasp's pose (4, 4) in the object's frame.
         config: how to try.
+        T_object_base: where the base of the arm stands that carries the hand, (4, 4); without it
+            the hand floats.
+
+    Raises:
+        InvalidArgumentError: the arm cannot bring the hand to where the approach begins.
     """
     joint = obj.joint_of(part)
     stride = config.stride
@@ -105,6 +112,7 @@ def try_grasp(
         np.eye(4),
         q,
         T_world_hand=approach[0],
+        T_world_base=T_object_base,
         config=config.physics,
         joint_creep=_JOINT_CREEP,
     )

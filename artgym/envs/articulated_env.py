@@ -13,7 +13,7 @@ from gymnasium import spaces
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from artgym.control import MAX_ROTATION, MAX_TRANSLATION, MAX_WIDTH
+from artgym.control import MAX_JOINT_TURN, MAX_ROTATION, MAX_TRANSLATION, MAX_WIDTH
 from artgym.envs import arguments
 from artgym.envs.observations import IMAGE_MODES, ObservationConfig, Observer, ObsMode
 from artgym.envs.snapshot import Snapshot
@@ -23,7 +23,14 @@ from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject
 from artgym.sim.camera import RenderedCamera, View, ViewDistribution
 from artgym.sim.renderer import own_render_system
-from artgym.sim.robots import RobotName, T_hand_tcp, hand_from_tcp
+from artgym.sim.robots import (
+    ACTION_SIZES,
+    CONTROL_MODES,
+    ControlMode,
+    RobotName,
+    T_hand_tcp,
+    hand_from_tcp,
+)
 from artgym.sim.scene import ManipulationScene, PartContact, PlacedObject, Reading
 from artgym.sim.setting import add_lights, random_hand_start, random_placement, random_table
 from artgym.tasks import rewards
@@ -76,7 +83,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         objects: Sequence[str] | None = None,
         target_part: int = 1,
         robot: RobotName = "hand",
-        control_mode: str = "delta_pose",
+        control_mode: ControlMode = "delta_pose",
         obs_mode: ObsMode = "state",
         camera_size: tuple[int, int] = (320, 240),
         num_cameras: int = 1,
@@ -97,7 +104,12 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         arguments.require_known("obs_mode", obs_mode, ObsMode)
         arguments.require_known("reward_mode", reward_mode, RewardMode)
         arguments.require_known("robot", robot, RobotName)
-        arguments.require_known("control_mode", control_mode, ("delta_pose",))
+        arguments.require_known("control_mode", control_mode, ControlMode)
+        if control_mode not in CONTROL_MODES[robot]:
+            raise InvalidArgumentError(
+                f"control_mode={control_mode!r} does not fit robot={robot!r}, which knows "
+                f"{', '.join(CONTROL_MODES[robot])}."
+            )
         if render_mode is not None:
             arguments.require_known("render_mode", render_mode, self.metadata["render_modes"])
         for name in randomised:
@@ -115,6 +127,8 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self.reward_mode: RewardMode = reward_mode
         self.render_mode = render_mode
         self.target_part = target_part
+        self.robot: RobotName = robot
+        self.control_mode: ControlMode = control_mode
         self.horizon = horizon
         self._randomised = frozenset(randomised)
         self._observation_config = ObservationConfig(
@@ -127,7 +141,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             num_parts=arguments.most_parts(self._object_ids),
         )
         self.observation_space = self._observation_config.space()
-        self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZES[control_mode],), np.float32)
         # One renderer serves observations and render(); other modes need none.
         self._needs_renderer = obs_mode in IMAGE_MODES or render_mode == "rgb_array"
         self._render_system = own_render_system() if self._needs_renderer else None
@@ -155,6 +169,12 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         return self._T_world_object
 
     @property
+    def T_world_base(self) -> Array | None:
+        """Pose (4, 4) of an arm's base; None for a floating hand."""
+        self._require_running("T_world_base")
+        return self._T_world_base
+
+    @property
     def progress(self) -> Progress:
         """The target joint's motion so far."""
         self._require_running("progress")
@@ -169,6 +189,12 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
     def joint_positions(self) -> Array:
         """Positions (K - 1,) of all joints, metres or radians."""
         return self._running_scene("joint_positions").body.positions()
+
+    def arm_positions(self) -> Array:
+        """Positions (7,) of an arm's joints, radians; (0,) of a floating hand."""
+        hand = self._running_scene("arm_positions").hand
+        assert hand is not None
+        return np.array(hand.arm_positions())
 
     def tcp_pose(self) -> Array:
         """``T_world_tcp`` (4, 4)."""
@@ -222,7 +248,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         q = obj.positions_with(self.target_part, start)
         target = PlacedObject(model=obj, T_world_object=T_world_object, q=q)
         others = self._surroundings(target, source("placement"))
-        T_world_tcp = random_hand_start(source("hand"), obj.bounds_at(q)[1])
+        T_world_base, T_world_hand = self._robot_start(target, source("hand"))
         cameras = self._view_distribution(obj)
         views = [
             cameras.sample(source("camera"), *self.camera_size)
@@ -234,13 +260,15 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
 
         self._drop_scene()
         self._object, self._T_world_object = obj, T_world_object
+        self._T_world_base = T_world_base
         self._joint = obj.joint_of(self.target_part)
         self._views = tuple(views)
         self._scene = scene = ManipulationScene(
             obj,
             T_world_object,
             q,
-            T_world_hand=T_world_tcp @ _T_TCP_HAND,
+            T_world_hand=T_world_hand,
+            T_world_base=T_world_base,
             width=0.5 * MAX_WIDTH,
             render_system=self._render_system,
             table_material=table,
@@ -319,7 +347,12 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         assert scene is not None
         hand = scene.hand
         assert hand is not None
-        dx, dy, dz, rx, ry, rz, jaws = action
+        *motion, jaws = action
+        hand.open_jaws(0.5 * MAX_WIDTH * (1.0 + jaws))
+        if self.control_mode == "delta_joint":
+            hand.turn_joints([MAX_JOINT_TURN * turn for turn in motion])  # type: ignore[union-attr]
+            return
+        dx, dy, dz, rx, ry, rz = motion
         x, y, z = self._reading.tcp_position
         (x0, y0, z0), (x1, y1, z1) = WORKSPACE_LOW, WORKSPACE_HIGH
         turn = quaternions.quaternion_from_rotation_vector(
@@ -333,7 +366,6 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         hand.pull_to(
             hand_from_tcp(target, quaternions.product(turn, self._reading.hand_quaternion))
         )
-        hand.open_jaws(0.5 * MAX_WIDTH * (1.0 + jaws))
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (360, 480, 3) uint8 if ``render_mode`` is "rgb_array"."""
@@ -413,6 +445,25 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             obj = catalog.load(object_id)
             if self.target_part < obj.num_parts:
                 return obj
+
+    def _robot_start(
+        self, target: PlacedObject, rng: np.random.Generator
+    ) -> tuple[Array | None, Array]:
+        """Where an arm's base stands, None for a floating hand; and where the hand starts."""
+        if self.robot == "hand":
+            highest = target.model.bounds_at(target.q)[1]
+            return None, random_hand_start(rng, highest) @ _T_TCP_HAND
+        # Compiled kinematics, which a floating hand does not need, take long to load.
+        from artgym.sim.workplace import arm_workplace
+
+        return arm_workplace(
+            target.model,
+            target.T_world_object,
+            target.q,
+            self.target_part,
+            self.direction,
+            rng,
+        )
 
     def _surroundings(
         self, target: PlacedObject, rng: np.random.Generator
@@ -521,7 +572,8 @@ class ArtOpenEnv(ArticulatedEnv):
     contact. Sparse: 1 in success, else 0. ``info["reward_terms"]`` lists the terms.
 
     **Start.** Object at the table's middle +-5 cm, turned by up to 20 degrees; its open fraction
-    in the category's start interval; the hand above it, half open; cameras in front.
+    in the category's start interval; the hand above it, an arm's hand before the part, half open;
+    cameras in front.
 
     **End.** Terminated when the part has made 90 % of the way that was left to the end of its
     range, in success. Truncated after ``horizon`` steps, or when physics becomes unstable
@@ -537,7 +589,8 @@ class ArtOpenEnv(ArticulatedEnv):
         split: "train", "val" or "test".
         objects: ids to draw from instead of whole categories.
         target_part: index of the part to move.
-        robot: "hand" floats; "panda" is an arm.
+        robot: "hand" floats; "panda" is an arm, whose base stands where it can take the part and
+            carry it. An object whose part no arm can carry is an error in ``reset``.
         control_mode: see Action.
         obs_mode: see Observation.
         camera_size: (width, height) of the observed pictures, pixels.

@@ -29,6 +29,7 @@ SPLITS: Mapping[str, range] = MappingProxyType(
 #: All numbers, of whatever split.
 ALL_NUMBERS = range(0, 1600)
 
+
 def category_of(obj: ArticulatedObject) -> Category:
     """An object's category; ``OTHER`` where it is none of the catalogue's."""
     return CATEGORIES.get(obj.category, OTHER)

@@ -26,8 +26,16 @@ from artgym.sim.conversion import pose_from_transform, transform_from_pose
 
 Array = NDArray[np.floating]
 
-#: A hand that floats, or one at the end of an arm that stands on the table.
+#: A hand that floats, or one at the end of an arm that stands before the object.
 RobotName = Literal["hand", "panda"]
+#: How a robot is told to move; what each takes stands in ``envs.articulated_env.ArtOpenEnv``.
+ControlMode = Literal["delta_pose", "delta_joint"]
+CONTROL_MODES: dict[RobotName, tuple[ControlMode, ...]] = {
+    "hand": ("delta_pose",),
+    "panda": ("delta_pose", "delta_joint"),
+}
+#: Numbers in an action of each mode, the jaws included.
+ACTION_SIZES: dict[ControlMode, int] = {"delta_pose": 7, "delta_joint": 8}
 
 
 @dataclass(frozen=True, kw_only=True)

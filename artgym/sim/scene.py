@@ -10,7 +10,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 import sapien
@@ -40,6 +40,9 @@ from artgym.sim.conversion import (
 )
 from artgym.sim.robots import FloatingHand, HandControl, tcp_from_hand
 from artgym.sim.surfaces import Surface, flat_surface, piece_surface
+
+if TYPE_CHECKING:
+    from artgym.sim.arm import PandaArm
 
 Array = NDArray[np.floating]
 
@@ -211,13 +214,14 @@ class ArticulatedBody:
 
 
 class ManipulationScene:
-    """A table, one object, others beside it, and a floating hand unless there is no start for it.
+    """A table, one object, others beside it, and a robot: a floating hand, or an arm with a base.
 
     Args:
         obj: the object.
         T_world_object: its pose, (4, 4).
         q: its joint positions.
-        T_world_hand: start of the hand, or None for a scene without one.
+        T_world_hand: start of the robot's hand, or None for a scene without a robot.
+        T_world_base: where the base of an arm stands; without it the hand floats.
         width: opening of the jaws at the start, metres.
         config: physics.
         render_system: shared renderer; without one the scene has nothing to be seen.
@@ -233,6 +237,7 @@ class ManipulationScene:
         q: Sequence[float] | Array,
         *,
         T_world_hand: Array | None = None,
+        T_world_base: Array | None = None,
         width: float = 0.08,
         config: PhysicsConfig = PhysicsConfig(),
         render_system: sapien.render.RenderSystem | None = None,
@@ -265,13 +270,30 @@ class ManipulationScene:
         )
         #: The object that the scene is about.
         self.body = self.bodies[0]
-        self.hand: FloatingHand | None = None
+        self.hand: FloatingHand | PandaArm | None = None
         self._hand_links: dict[physx.PhysxRigidBaseComponent, int] = {}
         if T_world_hand is not None:
-            self.hand = FloatingHand(
-                self.sapien_scene, T_world_hand, width, visuals=visuals, control=config.hand
-            )
-            self._hand_links = {link: i for i, link in enumerate(self.hand.links)}
+            self.hand = self._robot(T_world_base, T_world_hand, width, visuals)
+            # Of an arm only the hand and its fingers count as touching.
+            self._hand_links = {link: i for i, link in enumerate(self.hand.links[:3])}
+
+    def _robot(
+        self, T_world_base: Array | None, T_world_hand: Array, width: float, visuals: bool
+    ) -> FloatingHand | PandaArm:
+        scene, control = self.sapien_scene, self.config.hand
+        if T_world_base is None:
+            return FloatingHand(scene, T_world_hand, width, visuals=visuals, control=control)
+        # Compiled kinematics, which a floating hand does not need, take long to load.
+        from artgym.sim.arm import ArmControl, PandaArm
+
+        return PandaArm(
+            scene,
+            T_world_base,
+            T_world_hand,
+            width,
+            visuals=visuals,
+            control=ArmControl(hand=control),
+        )
 
     def _add_table(self, material: Material | None) -> None:
         entity = sapien.Entity()
