@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import artgym  # noqa: F401  registers the environments
 from artgym.objects import catalog
+from artgym.sim.robots import RobotName
 from benchmarks.policies import policy_entry
 
 #: Which movable part an episode is about: the object's first, or all of them in turn.
@@ -33,6 +34,8 @@ class EpisodeTask:
         seed: of the environment.
         policy_seed: of the policy; another, lest its draws repeat the environment's.
         weights: folder with ``{category}.safetensors``; None for the shipped ones.
+        env_id: of the environment.
+        robot: that acts in it.
     """
 
     policy: str
@@ -44,6 +47,8 @@ class EpisodeTask:
     seed: int
     policy_seed: int
     weights: Path | None = None
+    env_id: str = "ArtOpen-v0"
+    robot: RobotName = "hand"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,8 +106,10 @@ def episode_tasks(
     episodes: int,
     *,
     seed: int,
-    weights: Path | None,
+    weights: Path | None = None,
     parts: PartChoice = "first",
+    env_id: str = "ArtOpen-v0",
+    robot: RobotName = "hand",
 ) -> list[EpisodeTask]:
     """The episodes of a row: every policy is given the same objects, parts and starts."""
     tasks = []
@@ -122,6 +129,8 @@ def episode_tasks(
                     seed=int(seeds[0] >> 1),
                     policy_seed=int(seeds[1] >> 1),
                     weights=weights,
+                    env_id=env_id,
+                    robot=robot,
                 )
             )
     return tasks
@@ -144,8 +153,9 @@ def run_episode(
     entry = policy_entry(task.policy)
     began = time.perf_counter()
     env = gymnasium.make(
-        "ArtOpen-v0",
+        task.env_id,
         objects=(task.object_id,),
+        robot=task.robot,
         target_part=task.part,
         obs_mode=entry.obs_mode,
         render_mode=render_mode,

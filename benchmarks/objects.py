@@ -5,7 +5,6 @@ Run ``python -m benchmarks.objects --help``.
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -17,7 +16,7 @@ import numpy as np
 from rich.table import Table
 
 from artgym.annotation.filter import judge
-from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from artgym.sim import soundness
 from artgym.sim.scene import ManipulationScene
@@ -161,15 +160,7 @@ def measure(config: ObjectsConfig) -> dict[str, Any]:
     """
     path = config.out / "objects.json"
     options = {n: v for n, v in asdict(config).items() if n in ("sound", "opened", "seed")}
-    rows: dict[str, Any] = {}
-    if config.resume and path.exists():
-        try:
-            before = json.loads(path.read_text(encoding="utf-8"))
-            rows = before["rows"] if before["config"] == options else {}
-        except (ValueError, KeyError, TypeError) as error:
-            raise DamagedFileError(
-                f"{path} is damaged ({error}): remove it, or go without --resume."
-            ) from error
+    rows = record.kept_rows(path, options) if config.resume else {}
     result: dict[str, Any] = {}
     for category in config.category:
         if category not in rows:

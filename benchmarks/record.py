@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import artgym
+from artgym.errors import DamagedFileError
 from artgym.files import write_file_whole
 
 #: Where results go by default: beside the code, wherever the command is given.
@@ -102,6 +103,23 @@ def write_result(path: Path, result: dict[str, Any]) -> None:
         FileNotWrittenError: the system refused.
     """
     write_file_whole(path, (json_text(_json_value(result)) + "\n").encode())
+
+
+def kept_rows(path: Path, config: dict[str, Any]) -> dict[str, Any]:
+    """The rows of a result that an earlier run with the same config wrote; else none.
+
+    Raises:
+        DamagedFileError: there is a file, and it cannot be read.
+    """
+    if not path.exists():
+        return {}
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+        return before["rows"] if before["config"] == _json_value(config) else {}
+    except (ValueError, KeyError, TypeError) as error:
+        raise DamagedFileError(
+            f"{path} is damaged ({error}): remove it, or go without --resume."
+        ) from error
 
 
 def json_text(value: Any, indent: str = "") -> str:

@@ -1,0 +1,175 @@
+"""Can every environment be solved, by either robot, and only by acting on purpose?
+
+Run ``python -m benchmarks.solvability --help``.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from artgym.envs.arguments import require_known
+from artgym.errors import InvalidArgumentError
+from artgym.objects import catalog
+from artgym.registration import environment_ids
+from artgym.sim.robots import RobotName
+from benchmarks import record
+from benchmarks.command import run
+from benchmarks.episodes import EpisodeTask, episode_tasks, outcomes, run_in_worker
+from benchmarks.parallel import results_in_order
+from benchmarks.rates import aggregate
+
+#: The expert must succeed, doing nothing never, acting at random hardly ever.
+POLICIES = ("expert", "zero", "random")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolvabilityConfig:
+    """Can every environment be solved, by either robot, and only by acting on purpose?
+
+    Attributes:
+        env_id: environments, of a single object.
+        robot: robots.
+        category: categories of objects; all by default.
+        policy: of "expert", "zero", "random".
+        objects: test objects a category, one episode each, the movable parts in turn.
+        seed: of the episodes.
+        resume: keep the rows that ``solvability.json`` holds already.
+        workers: processes; the numbers do not depend on it.
+        out: folder for solvability.json.
+    """
+
+    env_id: tuple[str, ...] = ("ArtOpen-v0",)
+    robot: tuple[RobotName, ...] = ("hand", "panda")
+    category: tuple[str, ...] = tuple(catalog.CATEGORIES)
+    policy: tuple[str, ...] = POLICIES
+    objects: int = 50
+    seed: int = 0
+    resume: bool = False
+    workers: int = 2
+    out: Path = record.RESULTS_FOLDER
+
+    def __post_init__(self) -> None:
+        for name in ("objects", "workers"):
+            if getattr(self, name) < 1:
+                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        for category in self.category:
+            catalog.object_ids(category, "test", self.objects)
+        for env_id in self.env_id:
+            require_known("env_id", env_id, environment_ids("any-category", "single-object"))
+        for policy in self.policy:
+            require_known("policy", policy, POLICIES)
+
+
+def measure_row(
+    env_id: str, robot: RobotName, category: str, config: SolvabilityConfig
+) -> dict[str, Any]:
+    """The row of one environment, robot and category, with how it was made."""
+    began = time.perf_counter()
+    tasks: list[EpisodeTask] = []
+    for policy in config.policy:
+        tasks += episode_tasks(
+            policy,
+            category,
+            "test",
+            config.objects,
+            1,
+            seed=config.seed,
+            parts="in turn",
+            env_id=env_id,
+            robot=robot,
+        )
+    episodes = results_in_order(
+        run_in_worker,
+        tasks,
+        workers=config.workers,
+        description=f"{env_id}, {robot}, {category}",
+        unit="episode",
+    )
+    return {
+        **record.provenance("benchmarks.solvability"),
+        "env_id": env_id,
+        "robot": robot,
+        "category": category,
+        **{p: aggregate(outcomes(episodes, p, category)) for p in config.policy},
+        "not_solved": [
+            {name: getattr(e, name) for name in ("object_id", "part", "seed", "travel", "engaged")}
+            for e in outcomes(episodes, "expert", category)
+            if not e.success
+        ],
+        "seconds": round(time.perf_counter() - began, 1),
+    }
+
+
+def measure(config: SolvabilityConfig) -> dict[str, Any]:
+    """Measures row by row, and writes ``solvability.json`` after each.
+
+    With ``resume``, rows measured before with the same options are kept.
+
+    Raises:
+        DamagedFileError: there is a ``solvability.json`` to resume that cannot be read.
+    """
+    path = config.out / "solvability.json"
+    options = {n: v for n, v in asdict(config).items() if n in ("objects", "seed", "policy")}
+    rows = record.kept_rows(path, options) if config.resume else {}
+    result: dict[str, Any] = {"config": options, "rows": rows}
+    for env_id in config.env_id:
+        for robot in config.robot:
+            for category in config.category:
+                name = f"{env_id} {robot} {category}"
+                if name not in rows:
+                    rows[name] = measure_row(env_id, robot, category, config)
+                result = {"config": options, "rows": dict(sorted(rows.items()))}
+                record.write_result(path, result)
+    return result
+
+
+def table_from_rows(rows: dict[str, dict[str, Any]]) -> Table:
+    """The table for a person to read."""
+    table = Table(title="solvability: success, %, on test objects")
+    for name in ("environment", "robot", "category", "expert", "Wilson 95 %", "gripped"):
+        table.add_column(name, justify="right" if name == "expert" else "left")
+    for name in ("zero action", "random"):
+        table.add_column(name, justify="right")
+    for row in rows.values():
+        rates = {policy: row.get(policy) for policy in POLICIES}
+        low, high = rates["expert"]["success_interval"] if rates["expert"] else (0.0, 1.0)
+        table.add_row(
+            row["env_id"],
+            row["robot"],
+            row["category"],
+            *(
+                (
+                    f"{100 * rates['expert']['success']:.0f}",
+                    f"{100 * low:.0f}-{100 * high:.0f}",
+                    f"{100 * rates['expert']['success_gripped']:.0f}",
+                )
+                if rates["expert"]
+                else ("-", "-", "-")
+            ),
+            *(
+                f"{100 * rates[policy]['success']:.0f}" if rates[policy] else "-"
+                for policy in ("zero", "random")
+            ),
+        )
+    return table
+
+
+def report(config: SolvabilityConfig) -> list[Table]:
+    """Measures, writes ``solvability.json`` and gives the table."""
+    return [table_from_rows(measure(config)["rows"])]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the benchmark; see ``benchmarks.command.run``."""
+    return run("solvability", SolvabilityConfig, report, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
