@@ -5,7 +5,7 @@ Each raises one error that names the argument, what came, and what would do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, get_args
 
 import numpy as np
@@ -18,6 +18,10 @@ Array = NDArray[np.floating]
 
 #: Options of ``reset``.
 RESET_OPTIONS = ("object_id", "open_fraction")
+#: Most cameras that see a scene.
+MAX_CAMERAS = 16
+#: No hand, camera or observed point is farther out along an axis, metres.
+FARTHEST_PLACE = 10.0
 
 
 def require_known(kind: str, name: object, known: object) -> None:
@@ -27,64 +31,134 @@ def require_known(kind: str, name: object, known: object) -> None:
         UnknownNameError: names the nearest.
     """
     names: Sequence[str] = get_args(known) or known  # type: ignore[assignment]
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise UnknownNameError(kind, name, names)
 
 
-def require_between(name: str, value: object, low: float, high: float) -> None:
-    """Refuses what is not a whole number from ``low`` to ``high``.
+def require_between(name: str, value: Any, low: int, high: int) -> int:
+    """A whole number from ``low`` to ``high``.
 
     Raises:
-        InvalidArgumentError: says so.
+        InvalidArgumentError: it is anything else.
     """
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not (whole and low <= value <= high):
+    if not (is_whole(value) and low <= value <= high):
         raise InvalidArgumentError(
             f"{name}={value!r}: expected a whole number from {low:,} to {high:,}"
         )
+    return int(value)
+
+
+def is_whole(value: object) -> bool:
+    """Whether a value is a whole number by type; True and False are not."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def require_flag(name: str, value: object) -> bool:
+    """True or False.
+
+    Raises:
+        InvalidArgumentError: it is anything else.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidArgumentError(f"{name}={value!r}: expected True or False")
+    return bool(value)
+
+
+def require_names(name: str, value: Any) -> tuple[str, ...]:
+    """Names given one by one, or a single one.
+
+    Raises:
+        InvalidArgumentError: it is anything else.
+    """
+    if isinstance(value, str):
+        return (value,)
+    # An iterator could be read only once, and not by a copy of the environment.
+    if not isinstance(value, Iterable) or isinstance(value, Iterator):
+        raise InvalidArgumentError(f"{name}={value!r}: expected a name or a sequence of names")
+    names = tuple(value)
+    for each in names:
+        if not isinstance(each, str):
+            raise InvalidArgumentError(f"{name}={value!r}: expected names, but {each!r} is none")
+    return names
+
+
+def require_range(name: str, value: Any, low: int, high: int, meaning: str) -> tuple[int, int]:
+    """Two whole numbers from ``low`` to ``high``.
+
+    Args:
+        name: of the argument.
+        value: what came.
+        low: least of either number.
+        high: most of either number.
+        meaning: what they are, for the error.
+
+    Raises:
+        InvalidArgumentError: it is anything else.
+    """
+    try:
+        first, second = value
+        if all(is_whole(each) and low <= each <= high for each in (first, second)):
+            return int(first), int(second)
+    except (TypeError, ValueError):
+        pass
+    raise InvalidArgumentError(f"{name}={value!r}: expected {meaning} of {low} to {high}")
+
+
+def plain(value: Any) -> Any:
+    """An argument by its value: arrays and lists become tuples that can be compared and kept."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return tuple(plain(each) for each in value)
+    return value
 
 
 def require_camera_size(size: Any) -> tuple[int, int]:
     """The size (width, height) of pictures, pixels.
 
     Raises:
-        InvalidArgumentError: it is not two numbers of 16 to 4096.
+        InvalidArgumentError: it is not two whole numbers of 16 to 4096.
     """
-    try:
-        width, height = (int(side) for side in size)
-    except (TypeError, ValueError):
-        width = height = 0
-    if not (16 <= width <= 4096 and 16 <= height <= 4096):
-        raise InvalidArgumentError(
-            f"camera_size={size!r}: expected (width, height) of 16 to 4096 pixels"
-        )
-    return width, height
+    return require_range("camera_size", size, 16, 4096, "(width, height)")
 
 
 def require_camera_poses(poses: Any) -> Array:
     """Camera poses (n, 4, 4).
 
     Raises:
-        InvalidArgumentError: one is not a rigid transform.
+        InvalidArgumentError: one is not a rigid transform or too far out, or they are too many.
     """
     try:
-        Ts = np.asarray(poses, dtype=float).reshape(-1, 4, 4)
+        given = np.asarray(poses)
+        numbers = given if given.dtype.kind in "fiu" else np.empty(0)
+        Ts = numbers.astype(float).reshape(-1, 4, 4)
     except (TypeError, ValueError):
-        Ts = np.full((1, 4, 4), np.nan)
+        Ts = np.empty((0, 4, 4))
+    if not _are_rigid(Ts):
+        raise InvalidArgumentError(
+            f"camera_poses={poses!r}: expected T_world_camera, one or more rigid transforms (4, 4) "
+            "with OpenCV axes (z looks forward), in metres"
+        )
+    if len(Ts) > MAX_CAMERAS:
+        raise InvalidArgumentError(
+            f"camera_poses: {len(Ts)} of them; expected 1 to {MAX_CAMERAS} cameras"
+        )
+    if np.abs(Ts[:, :3, 3]).max() > FARTHEST_PLACE:
+        raise InvalidArgumentError(
+            f"camera_poses={poses!r}: expected cameras within {FARTHEST_PLACE} m along each axis"
+        )
+    return Ts
+
+
+def _are_rigid(Ts: Array) -> bool:
     R = Ts[:, :3, :3]
-    rigid = (
+    return bool(
         len(Ts) > 0
         and np.all(np.abs(Ts) < 1e3)
         and np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(3), atol=1e-4)
         and np.all(np.linalg.det(R) > 0)
         and np.allclose(Ts[:, 3], [0.0, 0.0, 0.0, 1.0])
     )
-    if not rigid:
-        raise InvalidArgumentError(
-            f"camera_poses={poses!r}: expected T_world_camera, one or more rigid transforms (4, 4) "
-            "with OpenCV axes (z looks forward), in metres"
-        )
-    return Ts
 
 
 def drawable_ids(
@@ -100,13 +174,13 @@ def drawable_ids(
         InvalidArgumentError: a category or an object has no such part, or nothing is left.
     """
     require_between("target_part", target_part, 1, 99)
+    require_known("split", split, catalog.SPLITS)
     if objects is not None:
-        ids = (objects,) if isinstance(objects, str) else tuple(objects)
+        ids = require_names("objects", objects)
         for object_id in ids:
             catalog.load(object_id).joint_of(target_part)
     else:
-        names = categories
-        if names is None:
+        if categories is None:
             every = {n: len(catalog.category(n).parts) for n in catalog.categories_with(split)}
             names = tuple(name for name, parts in every.items() if target_part < parts)
             if not names:
@@ -114,7 +188,8 @@ def drawable_ids(
                     f"target_part={target_part}: no category has more than "
                     f"{max(every.values()) - 1} movable parts"
                 )
-        names = (names,) if isinstance(names, str) else tuple(names)
+        else:
+            names = require_names("categories", categories)
         for name in names:
             parts = catalog.category(name).parts
             if target_part >= len(parts):
@@ -138,25 +213,46 @@ def most_parts(object_ids: Sequence[str]) -> int:
     return max(known + [catalog.load(i).num_parts for i in others])
 
 
-def read_options(options: Mapping[str, Any]) -> tuple[str | None, float | None]:
+def read_options(options: Any) -> tuple[str | None, float | None]:
     """Object id and open fraction asked of ``reset``; None where nothing was.
 
     Raises:
         UnknownNameError: an option that does not exist.
-        InvalidArgumentError: an open fraction outside [0, 1].
+        InvalidArgumentError: no options at all, or a value that is none.
     """
+    if not isinstance(options, Mapping):
+        raise InvalidArgumentError(
+            f"options={options!r}: expected a mapping with " + " or ".join(RESET_OPTIONS)
+        )
     for key in options:
         require_known("reset option", key, RESET_OPTIONS)
-    asked = options.get("open_fraction")
-    try:
-        fraction = None if asked is None else float(asked)
-    except (TypeError, ValueError):
-        fraction = np.nan
-    if fraction is not None and not 0.0 <= fraction <= 1.0:
+    object_id: Any = options.get("object_id")
+    fraction: Any = options.get("open_fraction")
+    if object_id is not None and not isinstance(object_id, str):
         raise InvalidArgumentError(
-            f"options['open_fraction']={asked!r}: expected 0 (closed) to 1 (open)"
+            f"options['object_id']={object_id!r}: expected the id of an object, as 'laptop/0012'"
         )
-    return options.get("object_id"), fraction
+    if fraction is not None:
+        is_number = is_whole(fraction) or isinstance(fraction, float | np.floating)
+        if not (is_number and 0.0 <= fraction <= 1.0):
+            raise InvalidArgumentError(
+                f"options['open_fraction']={fraction!r}: expected 0 (closed) to 1 (open)"
+            )
+        fraction = float(fraction)
+    return object_id, fraction
+
+
+def require_seed(seed: Any) -> int | None:
+    """A seed for ``reset``; None for none.
+
+    Raises:
+        InvalidArgumentError: it is not a whole number of 0 or more.
+    """
+    if seed is None:
+        return None
+    if not (is_whole(seed) and seed >= 0):
+        raise InvalidArgumentError(f"seed={seed!r}: expected a whole number of 0 or more, or None")
+    return int(seed)
 
 
 def read_action(action: Any, size: int) -> list[float]:
@@ -166,17 +262,20 @@ def read_action(action: Any, size: int) -> list[float]:
         InvalidArgumentError: it has another shape or is not finite.
     """
     try:
-        numbers = np.asarray(action, dtype=float)
-    except (TypeError, ValueError) as error:
+        given = np.asarray(action)
+    except Exception as error:
+        # Whatever an array-like object makes of being asked for its numbers.
         raise InvalidArgumentError(
             f"action={action!r}: expected {size} numbers in [-1, 1]"
         ) from error
-    if numbers.shape != (size,):
+    if given.dtype.kind not in "fiub":
+        raise InvalidArgumentError(f"action={action!r}: expected {size} numbers in [-1, 1]")
+    if given.shape != (size,):
         raise InvalidArgumentError(
-            f"action of shape {numbers.shape}: expected ({size},), one number in [-1, 1] for each "
+            f"action of shape {given.shape}: expected ({size},), one number in [-1, 1] for each "
             "entry of the action space"
         )
-    values: list[float] = numbers.tolist()
+    values: list[float] = given.astype(float).tolist()
     if not all([-np.inf < value < np.inf for value in values]):
         raise InvalidArgumentError(f"action={values}: expected finite numbers in [-1, 1]")
     return [min(1.0, max(-1.0, value)) for value in values]

@@ -112,12 +112,16 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             )
         if render_mode is not None:
             arguments.require_known("render_mode", render_mode, self.metadata["render_modes"])
+        randomised = arguments.require_names("randomised", randomised)
         for name in randomised:
             arguments.require_known("randomised", name, RANDOMISED)
         self.camera_size = arguments.require_camera_size(camera_size)
-        arguments.require_between("num_points", num_points, 1, 100_000)
-        arguments.require_between("num_cameras", num_cameras, 1, 16)
-        arguments.require_between("horizon", horizon, 1, 1_000_000)
+        num_points = arguments.require_between("num_points", num_points, 1, 100_000)
+        num_cameras = arguments.require_between(
+            "num_cameras", num_cameras, 1, arguments.MAX_CAMERAS
+        )
+        horizon = arguments.require_between("horizon", horizon, 1, 1_000_000)
+        target_part = arguments.require_between("target_part", target_part, 1, 99)
         self._Ts_world_camera = None
         if camera_poses is not None:
             self._Ts_world_camera = arguments.require_camera_poses(camera_poses)
@@ -136,7 +140,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             robot=robot,
             camera_size=self.camera_size,
             num_cameras=num_cameras,
-            segmentation=bool(segmentation),
+            segmentation=arguments.require_flag("segmentation", segmentation),
             num_points=num_points,
             num_parts=arguments.most_parts(self._object_ids),
         )
@@ -147,11 +151,14 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._render_system = own_render_system() if self._needs_renderer else None
         self._scene: ManipulationScene | None = None
         self._closed = False
+        # Why no step may follow; a blow-up leaves nothing else to ask for either.
         self._over = ""
+        self._blown_up = False
 
     def _keep_arguments(self, more: Mapping[str, Any]) -> None:
         """Remembers what this environment is made with, for copies and for snapshots."""
-        self._arguments: dict[str, Any] = {**getattr(self, "_arguments", {}), **more}
+        by_value = {name: arguments.plain(value) for name, value in more.items()}
+        self._arguments: dict[str, Any] = {**getattr(self, "_arguments", {}), **by_value}
         EzPickle.__init__(self, **self._arguments)
 
     # -- what others may ask -------------------------------------------------------------------
@@ -216,14 +223,16 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         """Starts an episode; the same seed gives the same bytes.
 
         Raises:
-            InvalidArgumentError: an unknown option, or an open fraction outside [0, 1].
+            InvalidArgumentError: an unknown option, an open fraction outside [0, 1], or no seed.
             UnknownNameError: an object id that is not in the catalogue.
             NotReadyError: the environment is closed.
         """
-        super().reset(seed=seed)
         if self._closed:
             raise NotReadyError("reset() after close(): make a new environment.")
-        self._begin(options or {})
+        options = {} if options is None else options
+        arguments.read_options(options)
+        super().reset(seed=arguments.require_seed(seed))
+        self._begin(options)
         contact = _UNTOUCHED
         return self._observe(), self._report(contact)
 
@@ -234,8 +243,8 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         if object_id is not None:
             asked = catalog.load(object_id)
             asked.joint_of(self.target_part)
-        self._begun_with = (copy.deepcopy(self.np_random.bit_generator.state), dict(options))
         rng = self.np_random
+        begun_with = copy.deepcopy(rng.bit_generator.state), dict(options)
 
         def source(name: str) -> np.random.Generator:
             """Where a thing is drawn from: what is not to vary is drawn alike every time."""
@@ -258,7 +267,9 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         light_seed = int(source("lights").integers(2**31))
         cloud_rng = np.random.default_rng(int(rng.integers(2**31)))
 
+        # Whatever cannot be done has been refused by now, and the running episode left as it is.
         self._drop_scene()
+        self._begun_with = begun_with
         self._object, self._T_world_object = obj, T_world_object
         self._T_world_base = T_world_base
         self._joint = obj.joint_of(self.target_part)
@@ -296,7 +307,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._way = 1.0 - start_fraction if self.direction > 0 else start_fraction
         self._succeeded_once = False
         self._actions: list[list[float]] = []
-        self._over = ""
+        self._over, self._blown_up = "", False
         self._look()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -304,24 +315,22 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
 
         Raises:
             InvalidArgumentError: the action has a wrong shape or is not finite.
-            NotReadyError: no episode is running.
+            NotReadyError: no episode is running: none was begun, or it is over.
         """
         if self._scene is None or self._over:
             self._require_running("step")
+            raise NotReadyError(f"step: {self._over}; call reset().")
         numbers = arguments.read_action(action, self.action_space.shape[0])
         contact = self._advance(numbers)
         if contact is None:
             # Nothing of a blow-up is shown: the last sound state stands in for it.
-            self._over = "the physics of this episode became unstable"
+            self._over, self._blown_up = "the physics of this episode became unstable", True
             info = copy.deepcopy(self._last_info) | {"unstable": True}
             return copy.deepcopy(self._last_observation), 0.0, False, True, info
         info = self._report(contact)
         reward = rewards.reward(self.reward_mode, info["reward_terms"], self._progress)
-        terminated = bool(
-            self._progress.success
-            and self._progress.headway(self.direction) >= DONE_SHARE * self._way
-        )
-        return self._observe(), reward, terminated, len(self._actions) >= self.horizon, info
+        terminated, truncated = self._end()
+        return self._observe(), reward, terminated, truncated, info
 
     def _advance(self, numbers: list[float]) -> PartContact | None:
         """Does an action; how the hand then touches the part, or None after a blow-up."""
@@ -340,6 +349,17 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._progress = self._progress.advance(fraction, contact.touched, contact.pinched)
         self._succeeded_once |= self._progress.success
         return contact
+
+    def _end(self) -> tuple[bool, bool]:
+        """Whether the episode is terminated, and whether it is truncated; then it is over."""
+        terminated = bool(
+            self._progress.success
+            and self._progress.headway(self.direction) >= DONE_SHARE * self._way
+        )
+        truncated = len(self._actions) >= self.horizon
+        if terminated or truncated:
+            self._over = "the episode is over"
+        return terminated, truncated
 
     def _move(self, action: list[float]) -> None:
         """Tells the robot where to go."""
@@ -429,6 +449,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             contact = self._advance(numbers)
         if contact is None:
             raise InvalidArgumentError("set_state(): the actions of this state end in a blow-up.")
+        self._end()
         self._observer.restore_generator(state.cloud_generator)
         return self._observe(), self._report(contact)
 
@@ -519,7 +540,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         if self._scene is None:
             reason = "after close(): make a new environment" if self._closed else "before reset()"
             raise NotReadyError(f"{what} {reason}.")
-        if self._over:
+        if self._blown_up:
             raise NotReadyError(f"{what}: {self._over}; call reset().")
 
     def _running_scene(self, what: str) -> ManipulationScene:

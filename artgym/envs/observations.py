@@ -17,9 +17,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from artgym.envs.arguments import FARTHEST_PLACE
 from artgym.geometry import quaternions, transforms
 from artgym.objects.model import ArticulatedObject
-from artgym.sim import rays
 from artgym.sim.camera import RenderedCamera, View
 from artgym.sim.masks import MaskCodes
 from artgym.sim.robots import RobotName
@@ -94,12 +94,12 @@ class ObservationConfig:
         if self.mode == "state_dict":
             return spaces.Dict({name: _vector(size) for name, size in fields.items()})
         found: dict[str, spaces.Space[Any]] = {
-            "T_world_tcp": _vector(16, 10.0),
+            "T_world_tcp": _vector(16, FARTHEST_PLACE),
             "jaw_width": spaces.Box(-0.01, 0.1, (1,), np.float32),
             "target_part": spaces.Discrete(self.num_parts),
         }
         if self.mode == "pointcloud":
-            found["points"] = _vector(3 * self.num_points, 10.0)
+            found["points"] = _vector(3 * self.num_points, FARTHEST_PLACE)
             if self.segmentation:
                 found["segmentation"] = spaces.Box(0, 255, (self.num_points,), np.uint8)
             return spaces.Dict(found)
@@ -108,7 +108,7 @@ class ObservationConfig:
             picture: dict[str, spaces.Space[Any]] = {
                 "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
                 "intrinsics": spaces.Box(0.0, 1e4, (9,), np.float32),
-                "T_world_camera": _vector(16, 10.0),
+                "T_world_camera": _vector(16, FARTHEST_PLACE),
             }
             if self.mode == "rgbd":
                 picture["depth"] = spaces.Box(0.0, 10.0, (height * width,), np.float32)
@@ -167,6 +167,9 @@ class Observer:
         )
         self._codes = MaskCodes(num_parts=tuple(body.model.num_parts for body in scene.bodies))
         if config.mode == "pointcloud":
+            # Meshes and rays take long to load, and only clouds need them.
+            from artgym.sim import rays
+
             self._cloud_camera = rays.PointCloudCamera(views[0], config.num_points)
             self._ray_bodies = [
                 *(rays.link_body(link) for body in scene.bodies for link in body.model.links),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from artgym.envs import arguments as checks
 from artgym.envs.articulated_env import ArtOpenEnv
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import matrix_from_axis_angle
@@ -57,13 +58,12 @@ class ArtSceneEnv(ArtOpenEnv):
     """
 
     def __init__(self, *, num_objects: tuple[int, int] = (3, 6), **arguments: Any) -> None:
-        try:
-            fewest, most = (int(n) for n in num_objects)
-        except (TypeError, ValueError):
-            fewest = most = 0
-        if not 1 <= fewest <= most <= 8:
+        fewest, most = checks.require_range(
+            "num_objects", num_objects, 1, 8, "the fewest and the most,"
+        )
+        if fewest > most:
             raise InvalidArgumentError(
-                f"num_objects={num_objects!r}: expected the fewest and the most, of 1 to 8"
+                f"num_objects={num_objects!r}: expected the fewest first, then the most"
             )
         self._num_objects = fewest, most
         self._keep_arguments({"num_objects": num_objects})

@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,8 @@ from artgym.errors import ArtgymError, InvalidArgumentError, NotReadyError, Work
 
 #: Starting a process and its first picture take this many times as long as a step may.
 _START_PATIENCE = 12.0
+#: More patience than this many seconds would be none.
+_MOST_PATIENCE = 86_400.0
 
 #: What one copy answers to a step: observation, reward, terminated, truncated, info; and, where a
 #: new episode was begun in the same step, the last observation and info of the one before.
@@ -220,8 +223,10 @@ class ArticulatedVectorEnv(VectorEnv[Any, Any, Any]):
     ) -> None:
         arguments.require_between("num_envs", num_envs, 1, 4096)
         arguments.require_between("workers", workers, 0, 256)
-        if not patience > 0:
-            raise InvalidArgumentError(f"patience={patience!r}: expected seconds, more than 0")
+        if not (isinstance(patience, Real) and 0 < patience <= _MOST_PATIENCE):
+            raise InvalidArgumentError(
+                f"patience={patience!r}: expected seconds, more than 0 and at most {_MOST_PATIENCE}"
+            )
         modes = (AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value)
         mode = getattr(autoreset_mode, "value", autoreset_mode)
         arguments.require_known("autoreset_mode", mode, modes)
@@ -260,9 +265,17 @@ class ArticulatedVectorEnv(VectorEnv[Any, Any, Any]):
         Raises:
             NotReadyError: after ``close``.
         """
-        if isinstance(seed, int | np.integer):
-            seed = [int(seed) + i for i in range(self.num_envs)]
-        seeds = [None] * self.num_envs if seed is None else list(seed)
+        seeds: list[int | None]
+        if seed is None or arguments.is_whole(seed):
+            first = arguments.require_seed(seed)
+            seeds = [None if first is None else first + i for i in range(self.num_envs)]
+        else:
+            try:
+                seeds = [arguments.require_seed(each) for each in seed]  # type: ignore[union-attr]
+            except TypeError as error:
+                raise InvalidArgumentError(
+                    f"seed={seed!r}: expected a whole number, or one for each environment"
+                ) from error
         if len(seeds) != self.num_envs:
             raise InvalidArgumentError(
                 f"seed: {len(seeds)} seeds for {self.num_envs} environments; expected one each"

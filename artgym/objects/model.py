@@ -16,7 +16,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry import transforms
@@ -155,6 +154,9 @@ class Convex:
 
 @lru_cache(maxsize=4096)
 def _hull_triangles(convex: Convex) -> NDArray[np.intp]:
+    # It takes as long to load as a whole environment, and most objects have no such shape.
+    from scipy.spatial import ConvexHull, QhullError
+
     points = convex.corners()
     try:
         hull = ConvexHull(points)

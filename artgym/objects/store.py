@@ -1,4 +1,8 @@
-"""Imported objects on this machine: a folder each, found by ids such as ``import/my_drawer``."""
+"""Imported objects on this machine: a folder each, found by ids such as ``import/my_drawer``.
+
+Every environment asks here whether an id is of an imported object. What reads and writes them is
+loaded when it is needed.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,6 @@ from artgym.errors import (
     InvalidArgumentError,
     UnknownNameError,
 )
-from artgym.objects.description import JSON_NAME, read_description, write_description
 from artgym.objects.model import ArticulatedObject
 
 #: Environment variable that names the folder of imported objects.
@@ -73,6 +76,8 @@ def save(obj: ArticulatedObject, name: str) -> str:
     # Two files make an object: they get their name together.
     fresh = folder() / f".new-{name}-{secrets.token_hex(4)}"
     old = folder() / f".old-{name}-{secrets.token_hex(4)}"
+    from artgym.objects.description import write_description
+
     try:
         write_description(replace(obj, object_id=new_id), fresh)
         for attempt in range(_ATTEMPTS):
@@ -105,6 +110,8 @@ def load(imported_id: str) -> ArticulatedObject:
         UnknownNameError: no such object; names the nearest.
         DamagedFileError: its files cannot be read.
     """
+    from artgym.objects.description import JSON_NAME
+
     path = _existing(imported_id) / JSON_NAME
     try:
         status = path.stat()
@@ -116,6 +123,8 @@ def load(imported_id: str) -> ArticulatedObject:
 @functools.lru_cache(maxsize=64)
 def _read(imported_id: str, path: Path, stamp: tuple[int, int, int]) -> ArticulatedObject:
     """Reads an object; ``stamp`` tells a replaced one from the one read before."""
+    from artgym.objects.description import read_description
+
     del stamp
     try:
         obj = read_description(path)
