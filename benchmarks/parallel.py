@@ -14,11 +14,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from tqdm import tqdm
 
 from artgym.errors import ArtgymError, InvalidArgumentError
-
-#: Sums over several threads round differently: with one, results do not depend on the machine.
-_ONE_THREAD = {
-    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "VECLIB")
-}
+from benchmarks.threads import ONE_THREAD
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -59,7 +55,7 @@ def results_in_order(
         max_workers=min(workers, max(len(tasks), 1)),
         reuse=False,  # pyright: ignore[reportArgumentType]
         initializer=_ignore_interrupt,
-        env=_ONE_THREAD,
+        env=dict(ONE_THREAD),
     )
     try:
         numbers = {executor.submit(function, task): i for i, task in enumerate(tasks)}

@@ -38,7 +38,7 @@ ALLOWED_IMPORTS = {
 # Who may import the simulator, by prefix of the module's name.
 SIMULATOR_USERS = {
     "sapien": ("artgym.sim", "artgym.maniskill"),
-    "mani_skill": ("artgym.maniskill",),
+    "mani_skill": ("artgym.maniskill", "benchmarks.maniskill_twin"),
 }
 # The plain-numpy packages import nothing that is heavy or draws.
 NUMPY_ONLY = ("artgym.geometry",)

@@ -21,12 +21,29 @@ from gymnasium.utils.env_checker import check_env
 from artgym.envs.articulated_env import HORIZON
 from artgym.errors import InvalidArgumentError, NotReadyError, UnknownNameError
 from artgym.registration import environment_ids
-from tests.contract.rollout import IMAGE_MODES, OBS_MODES, digest, make
+from benchmarks.determinism import digest_of
+from tests.contract.rollout import CONTROLS, IMAGE_MODES, OBS_MODES, digest, make, random_action
 
 ROOT = Path(__file__).resolve().parents[2]
-CASES = [(env_id, mode) for env_id in environment_ids("any-category") for mode in OBS_MODES]
+HAND, *ARM = CONTROLS
+CASES = [
+    *((env_id, mode, HAND) for env_id in environment_ids("any-category") for mode in OBS_MODES),
+    *(("ArtOpen-v0", mode, control) for mode in ("state", "pointcloud") for control in ARM),
+]
 #: Those of one category are the same classes with other arguments.
-ALL_CASES = [(env_id, mode) for env_id in environment_ids() for mode in OBS_MODES]
+ALL_CASES = [
+    (env_id, mode, control)
+    for env_id in environment_ids()
+    for mode in OBS_MODES
+    for control in CONTROLS
+]
+
+
+def name_of(case) -> str:
+    env_id, mode, control = case
+    return "-".join((env_id, mode, *control))
+
+
 INFO_KEYS = {
     "object_id", "success", "success_gripped", "success_once", "success_at", "success_maniskill",
     "success_where2act", "travel", "engaged", "gripped", "open_fraction", "reward_terms",
@@ -41,8 +58,8 @@ ALIKE_AT_THE_START = {
 }  # fmt: skip
 
 
-@pytest.fixture(params=CASES, ids=lambda case: "-".join(case))
-def case(request) -> tuple[str, str]:
+@pytest.fixture(params=CASES, ids=name_of)
+def case(request) -> tuple[str, str, tuple[str, str]]:
     if request.param[1] in IMAGE_MODES:
         request.getfixturevalue("render_system")
     return request.param
@@ -63,7 +80,7 @@ def random_steps(env, count, seed=0):
     rng = np.random.default_rng(seed)
     env.reset(seed=seed)
     for _ in range(count):
-        step = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+        step = env.step(random_action(env, rng))
         yield step
         if step[2] or step[3]:
             env.reset()
@@ -91,8 +108,9 @@ def test_observations_rewards_and_info(env):
         assert reward == pytest.approx(sum(info["reward_terms"].values()))
 
 
-def test_action_space(env):
-    assert env.action_space == spaces.Box(-1.0, 1.0, (7,), np.float32)
+def test_action_space(case, env):
+    size = {"delta_pose": 7, "delta_joint": 8}[case[2][1]]
+    assert env.action_space == spaces.Box(-1.0, 1.0, (size,), np.float32)
 
 
 def test_same_seed_same_rollout(case, env):
@@ -125,10 +143,6 @@ def test_two_resets_differ(env):
         assert not np.array_equal(elements(first)[name], elements(second)[name]), name
     other = env.reset(seed=1)[0]
     assert digest_of(other) != digest_of(first)
-
-
-def digest_of(observation) -> bytes:
-    return b"".join(np.asarray(v).tobytes() for v in elements(observation).values())
 
 
 def test_no_memory_is_shared_between_steps(env):
@@ -171,7 +185,7 @@ def test_closes_twice(env):
 
 
 def test_before_reset_and_after_close(env):
-    bare, action = env.unwrapped, np.zeros(7, np.float32)
+    bare, action = env.unwrapped, np.zeros(env.action_space.shape, np.float32)
     with pytest.raises(NotReadyError, match=r"step before reset\(\)"):
         bare.step(action)
     with pytest.raises(NotReadyError, match=r"object before reset\(\)"):
@@ -185,26 +199,28 @@ def test_before_reset_and_after_close(env):
 
 
 @pytest.mark.parametrize(
-    ("action", "mentioned"),
+    ("bad", "mentioned"),
     [
-        (np.full(7, np.nan), "finite"),
-        (np.array([0, 0, 0, np.inf, 0, 0, 0]), "finite"),
-        (np.zeros(6), r"shape \(6,\)"),
-        (np.zeros((1, 7)), r"shape \(1, 7\)"),
-        ("open it", "7 numbers"),
-        (None, "action"),
-        ([[1, 2], [3]], "7 numbers"),
+        (lambda size: np.full(size, np.nan), "finite"),
+        (lambda size: np.where(np.arange(size) == 3, np.inf, 0.0), "finite"),
+        (lambda size: np.zeros(size - 1), r"shape \([67],\)"),
+        (lambda size: np.zeros((1, size)), r"shape \(1, [78]\)"),
+        (lambda size: "open it", "[78] numbers"),
+        (lambda size: None, "action"),
+        (lambda size: [[1, 2], [3]], "[78] numbers"),
     ],
 )
-def test_bad_actions(env, action, mentioned):
+def test_bad_actions(env, bad, mentioned):
     bare = env.unwrapped
+    (size,) = env.action_space.shape
+    action = bad(size)
     bare.reset(seed=0)
     before = bare.tcp_pose()
     with pytest.raises(InvalidArgumentError, match=mentioned):
         bare.step(action)
     # Nothing has moved, and the episode goes on.
     np.testing.assert_array_equal(bare.tcp_pose(), before)
-    bare.step(np.zeros(7, np.float32))
+    bare.step(np.zeros(size, np.float32))
 
 
 def test_actions_beyond_the_space_are_clipped(case):
@@ -213,7 +229,7 @@ def test_actions_beyond_the_space_are_clipped(case):
         env = make(*case).unwrapped
         env.reset(seed=0)
         for _ in range(3):
-            env.step(scale * np.ones(7, np.float32))
+            env.step(scale * np.ones(env.action_space.shape, np.float32))
         poses.append(env.tcp_pose())
         env.close()
     np.testing.assert_array_equal(*poses)
@@ -243,16 +259,49 @@ def test_stable_baselines3_s_checker(case):
 
 
 def test_vector_environments(case):
-    env_id, mode = case
+    env_id, mode, (robot, control_mode) = case
     envs = gymnasium.make_vec(
-        env_id, num_envs=2, vectorization_mode="sync", obs_mode=mode, camera_size=(64, 48),
-        num_points=256,
+        env_id, num_envs=2, vectorization_mode="sync", obs_mode=mode, robot=robot,
+        control_mode=control_mode, camera_size=(64, 48), num_points=256,
     )  # fmt: skip
     envs.reset(seed=0)
-    observation, reward, *_ = envs.step(np.zeros((2, 7), np.float32))
+    observation, reward, *_ = envs.step(np.zeros(envs.action_space.shape, np.float32))
     assert envs.observation_space.contains(observation)
     assert reward.shape == (2,)
     envs.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ALL_CASES, ids=name_of)
+@pytest.mark.filterwarnings("error")
+def test_every_environment_passes_the_checkers(case, request):
+    if case[1] in IMAGE_MODES:
+        request.getfixturevalue("render_system")
+    env = make(*case)
+    check_env(env.unwrapped, skip_render_check=True)
+    stable_baselines3.common.env_checker.check_env(env, warn=True, skip_render_check=True)
+    copy = pickle.loads(pickle.dumps(env))
+    env.reset(seed=0)
+    copy.reset(seed=0)
+    for each in (env, copy):
+        each.close()
+        each.close()
+
+
+@pytest.mark.parametrize("mode", ["rgb", "rgbd", "pointcloud"])
+@pytest.mark.parametrize("env_id", environment_ids("any-category"))
+def test_segmentation(env_id, mode, request):
+    if mode in IMAGE_MODES:
+        request.getfixturevalue("render_system")
+    env = make(env_id, mode, segmentation=True, **({"num_cameras": 2} if mode == "rgb" else {}))
+    observation, _ = env.reset(seed=0)
+    assert_in_space(observation, env.observation_space)
+    # The object, and in a cloud not the table.
+    assert (observation["segmentation"] == 1 + env.unwrapped.target_part).any()
+    assert (observation["segmentation"] == 0).any() == (mode in IMAGE_MODES)
+    if mode == "rgb":
+        assert not np.array_equal(observation["T_world_camera"], observation["T_world_camera_1"])
+    env.close()
 
 
 @pytest.mark.parametrize("env_id", environment_ids("any-category"))

@@ -7,11 +7,7 @@ from artgym.envs.articulated_env import ArtCloseEnv, ArtOpenEnv
 from artgym.envs.scene_env import ArtSceneEnv
 from artgym.errors import InvalidArgumentError, NotReadyError
 from artgym.experts.scripted import ScriptedExpert
-from tests.contract.rollout import tokens
-
-
-def digest_of(*values):
-    return b"".join(token for value in values for token in tokens(value))
+from benchmarks.determinism import digest_of
 
 
 def goes_on(env, steps, seed):
