@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
+
+from artgym.envs.vector import ArticulatedVectorEnv
 
 
 class Sb3Copies(VecEnv):
@@ -24,12 +26,15 @@ class Sb3Copies(VecEnv):
     """
 
     def __init__(self, env_id: str, count: int, workers: int, seed: int, **made_with: Any) -> None:
-        self._envs = gymnasium.make_vec(
-            env_id,
-            num_envs=count,
-            workers=workers,
-            autoreset_mode=AutoresetMode.SAME_STEP,
-            **made_with,
+        self._envs = cast(
+            ArticulatedVectorEnv,
+            gymnasium.make_vec(
+                env_id,
+                num_envs=count,
+                workers=workers,
+                autoreset_mode=AutoresetMode.SAME_STEP,
+                **made_with,
+            ),
         )
         self._first_seed: int | None = seed
         self._answer: tuple[Any, ...] = ()

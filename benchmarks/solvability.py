@@ -138,26 +138,16 @@ def table_from_rows(rows: dict[str, dict[str, Any]]) -> Table:
     for name in ("zero action", "random"):
         table.add_column(name, justify="right")
     for row in rows.values():
-        rates = {policy: row.get(policy) for policy in POLICIES}
-        low, high = rates["expert"]["success_interval"] if rates["expert"] else (0.0, 1.0)
-        table.add_row(
-            row["env_id"],
-            row["robot"],
-            row["category"],
-            *(
-                (
-                    f"{100 * rates['expert']['success']:.0f}",
-                    f"{100 * low:.0f}-{100 * high:.0f}",
-                    f"{100 * rates['expert']['success_gripped']:.0f}",
-                )
-                if rates["expert"]
-                else ("-", "-", "-")
-            ),
-            *(
-                f"{100 * rates[policy]['success']:.0f}" if rates[policy] else "-"
-                for policy in ("zero", "random")
-            ),
-        )
+        expert = ("-", "-", "-")
+        if "expert" in row:
+            low, high = row["expert"]["success_interval"]
+            expert = (
+                f"{100 * row['expert']['success']:.0f}",
+                f"{100 * low:.0f}-{100 * high:.0f}",
+                f"{100 * row['expert']['success_gripped']:.0f}",
+            )
+        idle = [f"{100 * row[p]['success']:.0f}" if p in row else "-" for p in ("zero", "random")]
+        table.add_row(row["env_id"], row["robot"], row["category"], *expert, *idle)
     return table
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from rich.table import Table
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
@@ -105,7 +105,7 @@ class _Surface:
             diagonal=float(np.linalg.norm(high - low)),
         )
 
-    def reach(self, tree: cKDTree, points: Array) -> float:
+    def reach(self, tree: KDTree, points: Array) -> float:
         """The distance from this surface that 95 % of points (n, 3) keep within, metres.
 
         Measured to the planes of the nearest samples (``tree`` holds them): what lies sideways
@@ -128,7 +128,7 @@ def shape_distances(objects: Sequence[ArticulatedObject]) -> Array:
     surfaces = [_Surface.of(o, np.random.default_rng(i)) for i, o in enumerate(objects)]
     distances = np.full((len(objects), len(objects)), np.inf)
     for i, one in enumerate(surfaces):
-        tree = cKDTree(one.points)
+        tree = KDTree(one.points)
         for k, other in enumerate(surfaces):
             if k != i:
                 reach = one.reach(tree, other.points[:_QUERY_POINTS])

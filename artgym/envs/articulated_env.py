@@ -52,6 +52,8 @@ HORIZON = 300
 WORKSPACE_LOW, WORKSPACE_HIGH = (-1.2, -1.2, 0.0), (1.5, 1.2, 2.2)
 #: A joint or hand faster than this (m/s or rad/s), or a hand this far out, is a blow-up.
 MAX_STABLE_SPEED, MAX_STABLE_DISTANCE = 40.0, 3.0
+#: So is a part this far beyond an end of its range, as a share of it.
+MAX_STABLE_OVERSHOOT = 0.5
 #: An episode ends when the part has made this share of the way that was left, in success.
 DONE_SHARE = 0.9
 #: Open fraction at the start of a closing episode.
@@ -145,7 +147,8 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             num_parts=arguments.most_parts(self._object_ids),
         )
         self.observation_space = self._observation_config.space()
-        self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZES[control_mode],), np.float32)
+        self._action_size = ACTION_SIZES[control_mode]
+        self.action_space = spaces.Box(-1.0, 1.0, (self._action_size,), np.float32)
         # One renderer serves observations and render(); other modes need none.
         self._needs_renderer = obs_mode in IMAGE_MODES or render_mode == "rgb_array"
         self._render_system = own_render_system() if self._needs_renderer else None
@@ -320,7 +323,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         if self._scene is None or self._over:
             self._require_running("step")
             raise NotReadyError(f"step: {self._over}; call reset().")
-        numbers = arguments.read_action(action, self.action_space.shape[0])
+        numbers = arguments.read_action(action, self._action_size)
         contact = self._advance(numbers)
         if contact is None:
             # Nothing of a blow-up is shown: the last sound state stands in for it.
@@ -340,12 +343,15 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._move(numbers)
         scene.step(SUBSTEPS)
         reading = scene.read(self.target_part)
-        if not reading.is_sound(MAX_STABLE_SPEED, MAX_STABLE_DISTANCE):
+        fraction = self._joint.open_fraction(reading.q[self.target_part - 1])
+        if not (
+            reading.is_sound(MAX_STABLE_SPEED, MAX_STABLE_DISTANCE)
+            and -MAX_STABLE_OVERSHOOT <= fraction <= 1.0 + MAX_STABLE_OVERSHOOT
+        ):
             return None
         self._reading = reading
         self._grip_point = self._observer.grip_point(reading)
         contact = scene.contact(self.target_part)
-        fraction = self._joint.open_fraction(reading.q[self.target_part - 1])
         self._progress = self._progress.advance(fraction, contact.touched, contact.pinched)
         self._succeeded_once |= self._progress.success
         return contact
@@ -417,7 +423,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             environment=(type(self).__name__, self._arguments),
             generator=copy.deepcopy(generator),
             options=dict(options),
-            actions=np.array(self._actions).reshape(-1, *self.action_space.shape),
+            actions=np.array(self._actions).reshape(-1, self._action_size),
             cloud_generator=copy.deepcopy(self._observer.generator_before),
         )
 

@@ -103,7 +103,7 @@ def tcp_from_hand(position: Sequence[float], quaternion: Sequence[float]) -> qua
 def hand_from_tcp(position: Sequence[float], quaternion: Sequence[float]) -> sapien.Pose:
     """The hand's pose that brings its tool centre to a position, with axes as given."""
     (x, y, z), (i, j, k) = position, quaternions.z_axis(quaternion)
-    return sapien.Pose([x - TCP * i, y - TCP * j, z - TCP * k], quaternion)
+    return sapien.Pose([x - TCP * i, y - TCP * j, z - TCP * k], tuple(quaternion))
 
 
 @dataclass(frozen=True, kw_only=True)

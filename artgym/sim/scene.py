@@ -393,7 +393,7 @@ def _surface(friction: float) -> physx.PhysxMaterial:
     return physx.PhysxMaterial(friction, friction, 0.0)
 
 
-_NO_SCALE = np.ones(3, dtype=np.float32)
+_NO_SCALE = [1.0, 1.0, 1.0]
 
 
 def _collision_shape(
