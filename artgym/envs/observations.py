@@ -47,7 +47,10 @@ _HAND_FIELDS: Mapping[str, int] = MappingProxyType(
         "joint_pivot": 3,
         "grip_point": 3,
         "tcp_to_grip_point": 3,
+        "part_x_axis": 3,
+        "part_z_axis": 3,
         "part_size": 3,
+        "grip_size": 3,
     }
 )
 
@@ -181,7 +184,7 @@ class Observer:
         axis = T_world_object[:3, :3] @ np.asarray(joint.axis)
         pivot = transforms.apply(T_world_object, np.asarray(joint.pivot, dtype=float)[None])[0]
         self._joint = (float(joint.type == "revolute"), *axis.tolist(), *pivot.tolist())
-        self._part_size = tuple(size.tolist())
+        self._sizes = (*size.tolist(), *obj.grip_size(target_part).tolist())
 
     def grip_point(self, reading: Reading) -> quaternions.Vector:
         """Where the part is best taken, world frame, metres: ``ArticulatedObject.grip_point``."""
@@ -241,7 +244,9 @@ class Observer:
                 grip_point[0] - tcp[0],
                 grip_point[1] - tcp[1],
                 grip_point[2] - tcp[2],
-                *self._part_size,
+                *quaternions.x_axis(reading.part_quaternion),
+                *quaternions.z_axis(reading.part_quaternion),
+                *self._sizes,
                 *reading.arm_positions,
                 *reading.arm_velocities,
             ),

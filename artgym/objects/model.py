@@ -487,10 +487,18 @@ class ArticulatedObject:
         The middle of its handle; without one, of what lies farthest along a slide or farthest
         from a hinge: a lid's front edge. Privileged knowledge, for rewards and state observations.
         """
+        return self._grip_corners(part).mean(axis=0)
+
+    def grip_size(self, part: int) -> Array:
+        """Extents (3,) along the part's axes of what ``grip_point`` is the middle of, metres."""
+        return np.ptp(self._grip_corners(part), axis=0)
+
+    def _grip_corners(self, part: int) -> Array:
+        """Points (n, 3) around what a hand takes a part by, in the part's frame."""
         joint = self.joint_of(part)
         handle = self.links[part].bounds(roles=("handle",))
         if np.all(np.isfinite(handle)):
-            return handle.mean(axis=0)
+            return handle
         corners = np.concatenate([s.corners_link() for s in self.links[part].shapes])
         axis = np.asarray(joint.axis)
         if joint.type == "prismatic":
@@ -498,7 +506,7 @@ class ArticulatedObject:
         else:
             arm = corners - np.asarray(joint.pivot)
             reach = np.linalg.norm(arm - np.outer(arm @ axis, axis), axis=1)
-        return corners[reach > reach.max() - 0.004].mean(axis=0)
+        return corners[reach > reach.max() - 0.004]
 
     def content_hash(self) -> str:
         """SHA-256 of everything that describes the object; equal objects have equal hashes."""
