@@ -108,7 +108,7 @@ class ContactPolicy:
         return np.stack([np.cross(closing, approach), closing, approach], axis=-1)
 
     def _random_pull(self, fields: Mapping[str, Array]) -> Array:
-        """Translation and rotation (6,) of an action: mostly to and fro along the joint."""
+        """Translation and rotation (6,) of an action: mostly along the joint, either way."""
         rng = self._rng
         way = axis = fields["joint_axis"]
         if fields["is_revolute"][0]:

@@ -5,6 +5,7 @@ Run ``python -m benchmarks.rl_baselines --help``.
 
 from __future__ import annotations
 
+import io
 import sys
 import time
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from tqdm import tqdm
 
 import artgym  # noqa: F401  registers the environments
 from artgym.errors import InvalidArgumentError
+from artgym.files import write_file_whole
 from artgym.objects import catalog
 from benchmarks import record
 from benchmarks.command import run
@@ -34,20 +36,22 @@ class RlConfig:
         seeds: one policy is learned for each.
         steps: control steps of all copies together.
         copies: environments that run at a time.
-        rollout: steps of each copy between two updates.
+        repeat: control steps for which an action is kept up.
+        rollout: actions of each copy between two updates.
         batch, epochs: of an update.
         learning_rate: of Adam, falling to a tenth.
         discount: of rewards to come.
         layers: widths of the policy's and the value's networks.
         episodes: on as many test objects, once each, is a policy scored.
-        workers: processes that step the copies.
-        out: folder for rl_baselines.json, the curve and the policies.
+        workers: processes that step the copies; 0 steps them where the policy learns.
+        out: folder for rl_baselines.json and the curves, rl_baselines.png.
     """
 
     env_id: str = "ArtOpenDrawer-v0"
     seeds: tuple[int, ...] = (0, 1, 2)
-    steps: int = 3_000_000
+    steps: int = 2_400_000
     copies: int = 16
+    repeat: int = 2
     rollout: int = 256
     batch: int = 512
     epochs: int = 6
@@ -59,7 +63,16 @@ class RlConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("steps", "copies", "rollout", "batch", "epochs", "episodes", "workers"):
+        for name in (
+            "steps",
+            "copies",
+            "repeat",
+            "rollout",
+            "batch",
+            "epochs",
+            "episodes",
+            "workers",
+        ):
             if getattr(self, name) < 1:
                 raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
         if not self.seeds:
@@ -88,7 +101,7 @@ def train(config: RlConfig, seed: int) -> dict[str, Any]:
             self.ended: list[dict[str, Any]] = []
 
         def _on_step(self) -> bool:
-            bar.update(config.copies)
+            bar.update(config.copies * config.repeat)
             self.ended += [info for info in self.locals["infos"] if "terminal_observation" in info]
             return True
 
@@ -96,7 +109,7 @@ def train(config: RlConfig, seed: int) -> dict[str, Any]:
             if len(self.ended) < config.copies:
                 return
             point = {
-                "steps": self.num_timesteps,
+                "steps": self.num_timesteps * config.repeat,
                 "seconds": round(time.perf_counter() - began, 1),
                 **{
                     name: round(float(np.mean([info[name] for info in self.ended])), 4)
@@ -108,7 +121,9 @@ def train(config: RlConfig, seed: int) -> dict[str, Any]:
             bar.set_postfix(success=point["success"])
             self.ended = []
 
-    copies = Sb3Copies(config.env_id, config.copies, config.workers, seed)
+    copies = Sb3Copies(
+        config.env_id, config.copies, config.workers, repeat=config.repeat, seed=seed
+    )
     envs = VecNormalize(VecMonitor(copies), gamma=config.discount, clip_obs=5.0)
     try:
         model = PPO(
@@ -123,7 +138,7 @@ def train(config: RlConfig, seed: int) -> dict[str, Any]:
             device="cpu",
             policy_kwargs={"net_arch": list(config.layers), "log_std_init": -0.5},
         )
-        model.learn(config.steps, callback=Watch())
+        model.learn(config.steps // config.repeat, callback=Watch())
     finally:
         envs.close()
         bar.close()
@@ -149,8 +164,12 @@ def score(config: RlConfig, act: Any) -> dict[str, Any]:
         observation, info = env.reset(seed=number)
         over = False
         while not over:
-            observation, _, terminated, truncated, info = env.step(act(observation))
-            over = terminated or truncated
+            action = act(observation)
+            for _ in range(config.repeat):
+                observation, _, terminated, truncated, info = env.step(action)
+                over = terminated or truncated
+                if over:
+                    break
         env.close()
         infos.append(info)
     successes = sum(info["success"] for info in infos)
@@ -191,10 +210,33 @@ def table_from_rows(rows: Sequence[dict[str, Any]]) -> Table:
     return table
 
 
+def draw_curves(rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """Success in training over control steps, a line a seed, as a PNG."""
+    import matplotlib.figure
+
+    figure = matplotlib.figure.Figure(figsize=(6, 4), layout="constrained")
+    axes = figure.add_subplot()
+    for row in rows:
+        points = np.array([[point["steps"], point["success"]] for point in row["curve"]])
+        if len(points):
+            # The mean of what lies about a point: a few episodes end between two updates.
+            window = np.ones(min(9, len(points))) / min(9, len(points))
+            smooth = np.convolve(points[:, 1], window, mode="valid")
+            at = np.convolve(points[:, 0], window, mode="valid")
+            axes.plot(at / 1e6, 100 * smooth, label=f"seed {row['seed']}")
+    axes.set(xlabel="control steps, millions", ylabel="success in training, %", ylim=(0, 100))
+    axes.legend()
+    axes.grid(alpha=0.3)
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=120)
+    write_file_whole(path, picture.getvalue())
+
+
 def report(config: RlConfig) -> list[Table]:
-    """Learns, writes ``rl_baselines.json`` and gives the table."""
+    """Learns, writes ``rl_baselines.json`` and the curves, and gives the table."""
     result = measure(config)
     record.write_result(config.out / "rl_baselines.json", result)
+    draw_curves(result["rows"], config.out / "rl_baselines.png")
     return [table_from_rows(result["rows"])]
 
 

@@ -17,15 +17,28 @@ from artgym.envs.vector import ArticulatedVectorEnv
 class Sb3Copies(VecEnv):
     """Copies of an environment, stepped together in a few processes.
 
+    An episode that ends in success counts as cut off, not as over: what would have followed is as
+    good, and a learner that takes it for nothing keeps from succeeding.
+
     Args:
         env_id: of the environment.
         count: copies.
         workers: processes; 0 steps them in this one.
+        repeat: control steps for which an action is kept up.
         seed: of the first reset.
         made_with: arguments of the copies.
     """
 
-    def __init__(self, env_id: str, count: int, workers: int, seed: int, **made_with: Any) -> None:
+    def __init__(
+        self,
+        env_id: str,
+        count: int,
+        workers: int,
+        *,
+        repeat: int = 1,
+        seed: int = 0,
+        **made_with: Any,
+    ) -> None:
         self._envs = cast(
             ArticulatedVectorEnv,
             gymnasium.make_vec(
@@ -36,6 +49,7 @@ class Sb3Copies(VecEnv):
                 **made_with,
             ),
         )
+        self._repeat = repeat
         self._first_seed: int | None = seed
         self._answer: tuple[Any, ...] = ()
         self._action: Any = None
@@ -53,16 +67,23 @@ class Sb3Copies(VecEnv):
 
     def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Steps all copies; the infos hold what an episode's end was like, and nothing else."""
-        observations, rewards, terminated, truncated, info = self._envs.step(self._action)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        done = terminated | truncated
-        for i in np.flatnonzero(done):
-            infos[i] = {
-                **info["final_info"][i],
-                "terminal_observation": info["final_obs"][i],
-                "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
-            }
-        return observations, rewards.astype(np.float32), done, infos
+        total = np.zeros(self.num_envs, dtype=np.float32)
+        over = np.zeros(self.num_envs, dtype=np.bool_)
+        for _ in range(self._repeat):
+            # A new episode does not begin with the end of an old action.
+            actions = np.where(over[:, None], np.float32(0.0), self._action)
+            observations, rewards, terminated, truncated, info = self._envs.step(actions)
+            total += np.where(over, 0.0, rewards)
+            ended = (terminated | truncated) & ~over
+            for i in np.flatnonzero(ended):
+                infos[i] = {
+                    **info["final_info"][i],
+                    "terminal_observation": info["final_obs"][i],
+                    "TimeLimit.truncated": True,
+                }
+            over |= ended
+        return observations, total, over, infos
 
     def close(self) -> None:
         """Ends the workers."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium
@@ -51,7 +51,7 @@ HORIZON = 300
 #: The hand's target stays inside this box, metres.
 WORKSPACE_LOW, WORKSPACE_HIGH = (-1.2, -1.2, 0.0), (1.5, 1.2, 2.2)
 #: A joint or hand faster than this (m/s or rad/s), or a hand this far out, is a blow-up.
-MAX_STABLE_SPEED, MAX_STABLE_DISTANCE = 40.0, 3.0
+MAX_STABLE_SPEED, MAX_STABLE_DISTANCE = 90.0, 3.0
 #: So is a part this far beyond an end of its range, as a share of it.
 MAX_STABLE_OVERSHOOT = 0.5
 #: An episode ends when the part has made this share of the way that was left, in success.
@@ -60,6 +60,9 @@ DONE_SHARE = 0.9
 CLOSING_START = (0.6, 0.9)
 #: What an episode draws at random besides its object and the part's start.
 RANDOMISED = ("placement", "hand", "camera", "table", "lights")
+
+#: Objects drawn for an arm before it is an error that none is within its reach.
+_DRAWS = 20
 
 _T_TCP_HAND = transforms.invert(T_hand_tcp)
 _PRETTY_SIZE = (480, 360)
@@ -250,17 +253,12 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         begun_with = copy.deepcopy(rng.bit_generator.state), dict(options)
 
         def source(name: str) -> np.random.Generator:
-            """Where a thing is drawn from: what is not to vary is drawn alike every time."""
+            """What a thing is drawn from: what is not to vary is drawn alike every time."""
             return rng if name in self._randomised else np.random.default_rng(0)
 
-        obj = self._draw_object(rng) if asked is None else asked
-        drawn_fraction = float(rng.uniform(*self._start_fraction(obj)))
-        T_world_object = random_placement(source("placement"))
-        start = drawn_fraction if fraction is None else fraction
-        q = obj.positions_with(self.target_part, start)
-        target = PlacedObject(model=obj, T_world_object=T_world_object, q=q)
+        target, T_world_base, T_world_hand = self._draw_target(asked, fraction, source)
+        obj, T_world_object, q = target.model, target.T_world_object, target.q
         others = self._surroundings(target, source("placement"))
-        T_world_base, T_world_hand = self._robot_start(target, source("hand"))
         cameras = self._view_distribution(obj)
         views = [
             cameras.sample(source("camera"), *self.camera_size)
@@ -473,6 +471,30 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             if self.target_part < obj.num_parts:
                 return obj
 
+    def _draw_target(
+        self,
+        asked: ArticulatedObject | None,
+        fraction: float | None,
+        source: Callable[[str], np.random.Generator],
+    ) -> tuple[PlacedObject, Array | None, Array]:
+        """The object to be moved as it stands, and ``_robot_start``.
+
+        Of objects drawn at random those are passed over whose part is out of an arm's reach.
+        """
+        rng = self.np_random
+        for left in reversed(range(_DRAWS)):
+            obj = self._draw_object(rng) if asked is None else asked
+            drawn = float(rng.uniform(*self._start_fraction(obj)))
+            T_world_object = random_placement(source("placement"))
+            q = obj.positions_with(self.target_part, drawn if fraction is None else fraction)
+            target = PlacedObject(model=obj, T_world_object=T_world_object, q=q)
+            try:
+                return target, *self._robot_start(target, source("hand"))
+            except InvalidArgumentError:
+                if asked is not None or not left:
+                    raise
+        raise AssertionError("the last draw returns or raises")
+
     def _robot_start(
         self, target: PlacedObject, rng: np.random.Generator
     ) -> tuple[Array | None, Array]:
@@ -617,7 +639,7 @@ class ArtOpenEnv(ArticulatedEnv):
         objects: ids to draw from instead of whole categories.
         target_part: index of the part to move.
         robot: "hand" floats; "panda" is an arm, whose base stands where it can take the part and
-            carry it. An object whose part no arm can carry is an error in ``reset``.
+            carry it. An object asked for whose part no arm can carry is an error in ``reset``.
         control_mode: see Action.
         obs_mode: see Observation.
         camera_size: (width, height) of the observed pictures, pixels.

@@ -64,7 +64,7 @@ STATE_FIELDS: Mapping[RobotName, Mapping[str, int]] = MappingProxyType(
 )
 
 #: No coordinate, velocity or size in a scene that is still stable exceeds this.
-LIMIT = 50.0
+LIMIT = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -59,15 +59,15 @@ def arm_workplace(
     motions = joint.motion(joint.position(np.linspace(start, end, 6))) @ to_rest
     motions = T_world_object @ motions @ transforms.invert(T_world_object)
     point = transforms.apply(T_world_part, obj.grip_point(part)[None])[0]
-    way = transforms.apply(motions[1], point[None])[0] - point
-    way /= np.linalg.norm(way)
+    axis = T_world_object[:3, :3] @ np.asarray(joint.axis)
+    way = direction * np.sign(joint.range) * axis
     towards = [-way]
     if joint.type == "revolute":
-        axis = T_world_object[:3, :3] @ np.asarray(joint.axis)
         arm = point - transforms.apply(T_world_object, np.asarray(joint.pivot)[None])[0]
         arm -= (arm @ axis) * axis
         arm /= max(float(np.linalg.norm(arm)), 1e-9)
-        towards += [-(way + arm) / np.sqrt(2.0), -arm, (arm - way) / np.sqrt(2.0)]
+        way = np.cross(way, arm)
+        towards = [-way, -(way + arm) / np.sqrt(2.0), -arm, (arm - way) / np.sqrt(2.0)]
     # And the same from above.
     lowered = [each - [0.0, 0.0, 1.0] for each in towards if each[2] > -0.9]
     towards += [each / np.linalg.norm(each) for each in lowered]

@@ -13,8 +13,9 @@ from gymnasium import spaces
 
 from artgym.envs.articulated_env import ArtCloseEnv, ArtOpenEnv
 from artgym.envs.scene_env import ArtSceneEnv
-from artgym.errors import ArtgymError, InvalidArgumentError, NotReadyError
+from artgym.errors import InvalidArgumentError, NotReadyError
 from benchmarks import fuzz
+from benchmarks.determinism import digest_of
 from benchmarks.fuzz import Episode, FuzzConfig
 
 
@@ -22,12 +23,16 @@ def named(values):
     return [(name, value) for name, each in values.items() for value in each]
 
 
+def refusals():
+    return Episode(number=0, rng=np.random.default_rng(0))
+
+
 @pytest.mark.parametrize("env_class", [ArtOpenEnv, ArtSceneEnv])
 def test_every_wrong_argument_is_refused(env_class):
+    episode = refusals()
     for name, value in named(fuzz.WRONG_ARGUMENTS):
-        with pytest.raises(ArtgymError):
-            env_class(**{name: value})
-            pytest.fail(f"{name}={value!r} was accepted")
+        episode.misuse(f"{name}={value!r}", lambda wrong={name: value}: env_class(**wrong))
+    assert episode.violations == []
 
 
 @pytest.mark.parametrize("arguments", fuzz.CONFLICTS, ids=str)
@@ -43,29 +48,45 @@ def test_every_odd_argument_will_do():
         env.close()
 
 
+def make_mistakes(env):
+    episode = refusals()
+    for seed in fuzz.WRONG_SEEDS:
+        episode.misuse(f"reset(seed={seed!r})", lambda seed=seed: env.reset(seed=seed))
+    for options in fuzz.WRONG_OPTIONS:
+        episode.misuse(f"reset({options!r})", lambda wrong=options: env.reset(options=wrong))
+    for action in fuzz.WRONG_ACTIONS:
+        episode.misuse(f"step({action!r})", lambda action=action: env.step(action))
+    assert episode.violations == []
+
+
 def test_every_wrong_reset_and_action_is_refused_and_leaves_no_trace():
-    digests = []
+    found = []
     for is_wronged in (False, True):
         env = ArtOpenEnv(objects=("drawer/0004",))
-        observation, _ = env.reset(seed=0)
-        wrong_calls = [
-            *(lambda v=v: env.reset(seed=v) for v in fuzz.WRONG_SEEDS),
-            *(lambda v=v: env.reset(options=v) for v in fuzz.WRONG_OPTIONS),
-            *(lambda v=v: env.step(v) for v in fuzz.WRONG_ACTIONS),
-        ]
-        for i, call in enumerate(wrong_calls if is_wronged else ()):
-            with pytest.raises(ArtgymError):
-                call()
-                pytest.fail(f"wrong call {i} was accepted")
+        env.reset(seed=0)
+        if is_wronged:
+            make_mistakes(env)
         state = env.get_state()
-        observation, *_ = env.step(np.full(7, 0.5))
-        digests.append(observation.tobytes())
+        found.append(digest_of(*env.step(np.full(7, 0.5))))
         # It can still be brought back.
         env.set_state(state)
-        assert env.step(np.full(7, 0.5))[0].tobytes() == digests[-1]
-        digests.append(env.reset()[0].tobytes())
+        assert digest_of(*env.step(np.full(7, 0.5))) == found[-1]
+        found.append(digest_of(*env.reset()))
         env.close()
-    assert digests[:2] == digests[2:]
+    assert found[:2] == found[2:]
+
+
+def test_a_refused_draw_leaves_the_running_episode_to_be_brought_back():
+    # A door is too large for a table with other things, unless it is asked for.
+    env = ArtSceneEnv(objects=("door/0001",), num_objects=(1, 1))
+    env.reset(seed=0, options={"object_id": "laptop/0005"})
+    with pytest.raises(InvalidArgumentError, match="long, wide and high"):
+        env.reset()
+    state = env.get_state()
+    found = digest_of(*env.step(np.full(7, 0.5)))
+    env.set_state(state)
+    assert digest_of(*env.step(np.full(7, 0.5))) == found
+    env.close()
 
 
 def test_every_odd_reset_and_action_will_do():
@@ -117,27 +138,9 @@ def test_states_pass_between_environments_whose_arguments_mean_the_same():
     second.close()
 
 
-def test_a_refused_draw_leaves_the_running_episode_to_be_brought_back():
-    env = ArtSceneEnv(objects=("door/0001",))
-    env.reset(seed=0, options={"object_id": "laptop/0005"}) if False else None
-    with pytest.raises(InvalidArgumentError, match="long, wide and high"):
-        env.reset(seed=0)
-    env.close()
-
-
 def test_a_small_run(tmp_path, capsys):
-    arguments = [
-        "--episodes",
-        "8",
-        "--resets",
-        "4",
-        "--swaps",
-        "4",
-        "--memory-mode",
-        "state",
-        "--workers",
-        "1",
-    ]
+    sizes = {"episodes": 8, "resets": 4, "swaps": 4, "memory-mode": "state", "workers": 1}
+    arguments = [word for name, size in sizes.items() for word in (f"--{name}", str(size))]
     assert fuzz.main([*arguments, "--out", str(tmp_path)]) == 0
     assert "8 episodes" in capsys.readouterr().out
     result = json.loads((tmp_path / "fuzz.json").read_text())
@@ -206,7 +209,7 @@ def test_what_counts_as_a_violation():
     assert episode.counts == {"valid": 2, "misuse": 3}
 
 
-INFO = {"travel": 0.1, "engaged": 1.0, "gripped": 0.0, "object_id": "a", "terms": {"move": 0.2}}
+INFO = {"travel": 0.1, "engaged": 1.0, "gripped": 0.0, "object_id": "a", "at": {"50": True}}
 
 
 @pytest.mark.parametrize(
@@ -214,21 +217,22 @@ INFO = {"travel": 0.1, "engaged": 1.0, "gripped": 0.0, "object_id": "a", "terms"
     [
         ({"a": np.zeros(2, np.float32)}, {}, None),
         ({"a": np.array([0, np.nan], np.float32)}, {}, "a is not finite"),
-        ({"a": np.array([0, 2], np.float32)}, {}, "largest 2.0"),
-        ({"a": np.zeros(2)}, {}, "float64"),
-        ({"b": np.zeros(2, np.float32)}, {}, "fields"),
-        ({"a": np.zeros(2, np.float32)}, {"terms": {"move": np.inf}}, r"terms.move"),
-        ({"a": np.zeros(2, np.float32)}, {"engaged": 1.1}, "engaged"),
-        ({"a": np.zeros(2, np.float32)}, {"travel": -0.1}, "travel"),
+        ({"a": np.array([0, 2], np.float32)}, {}, "a is not in its space"),
+        ({"a": np.zeros(2)}, {}, "a is not in its space"),
+        ({"b": np.zeros(2, np.float32)}, {}, "other fields than the space"),
+        (
+            {"a": np.zeros(2, np.float32)},
+            {"at": {"50": np.inf}},
+            "info[at.50] is not finite",
+        ),
+        ({"a": np.zeros(2, np.float32)}, {"engaged": 1.1}, "info[engaged] is out of range"),
+        ({"a": np.zeros(2, np.float32)}, {"travel": -0.1}, "info[travel] is out of range"),
     ],
 )
 def test_faults(observation, info, fault):
     space = spaces.Dict({"a": spaces.Box(-1, 1, (2,), np.float32)})
     found = fuzz.faults(space, observation, INFO | info)
-    if fault is None:
-        assert found == []
-    else:
-        assert any(fault in each for each in found), found
+    assert [each for each, _ in found] == ([] if fault is None else [fault])
 
 
 def test_growth_is_of_the_second_half():

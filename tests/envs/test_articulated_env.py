@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from artgym.control import MAX_ROTATION, MAX_TRANSLATION
+from artgym.envs import articulated_env
 from artgym.envs.articulated_env import ArtOpenEnv
 from artgym.envs.observations import STATE_FIELDS
 from artgym.geometry import transforms
@@ -175,6 +176,17 @@ def test_a_blow_up_ends_the_episode_and_leaves_no_trace(obs_mode):
         again if obs_mode == "state" else again["points"],
         rest if obs_mode == "state" else rest["points"],
     )
+    env.close()
+
+
+def test_a_part_far_beyond_its_range_is_a_blow_up(monkeypatch):
+    env = ArtOpenEnv()
+    env.reset(seed=0)
+    # Shrinks what is tolerated, so that a part that stands nearly closed is beyond it.
+    monkeypatch.setattr(articulated_env, "MAX_STABLE_OVERSHOOT", -0.2)
+    _, reward, terminated, truncated, info = env.step(np.zeros(7, np.float32))
+    assert (reward, terminated, truncated, info["unstable"]) == (0.0, False, True, True)
+    assert info["travel"] == 0.0
     env.close()
 
 
