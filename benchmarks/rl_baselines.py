@@ -63,16 +63,7 @@ class RlConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in (
-            "steps",
-            "copies",
-            "repeat",
-            "rollout",
-            "batch",
-            "epochs",
-            "episodes",
-            "workers",
-        ):
+        for name in "steps copies repeat rollout batch epochs episodes".split():
             if getattr(self, name) < 1:
                 raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
         if not self.seeds:
