@@ -63,7 +63,7 @@ class RlConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in "steps copies repeat rollout batch epochs episodes".split():
+        for name in ["steps", "copies", "repeat", "rollout", "batch", "epochs", "episodes"]:
             if getattr(self, name) < 1:
                 raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
         if not self.seeds:
@@ -208,13 +208,14 @@ def draw_curves(rows: Sequence[dict[str, Any]], path: Path) -> None:
     figure = matplotlib.figure.Figure(figsize=(6, 4), layout="constrained")
     axes = figure.add_subplot()
     for row in rows:
-        points = np.array([[point["steps"], point["success"]] for point in row["curve"]])
-        if len(points):
-            # The mean of what lies about a point: a few episodes end between two updates.
-            window = np.ones(min(9, len(points))) / min(9, len(points))
-            smooth = np.convolve(points[:, 1], window, mode="valid")
-            at = np.convolve(points[:, 0], window, mode="valid")
-            axes.plot(at / 1e6, 100 * smooth, label=f"seed {row['seed']}")
+        points = np.array([[p["steps"], p["success"]] for p in row["curve"]]).reshape(-1, 2)
+        # The mean of what lies about a point: a few episodes end between two updates.
+        size = max(1, min(9, len(points)))
+        means = [
+            points[i : i + size].mean(axis=0) for i in range(0, max(0, len(points) - size + 1))
+        ]
+        at, success = np.array(means).reshape(-1, 2).T
+        axes.plot(at / 1e6, 100 * success, label=f"seed {row['seed']}")
     axes.set(xlabel="control steps, millions", ylabel="success in training, %", ylim=(0, 100))
     axes.legend()
     axes.grid(alpha=0.3)
