@@ -327,7 +327,7 @@ def test_the_horizon_truncates(env_id, horizon):
         ({"robot": "pandas"}, "panda"),
         ({"control_mode": "pose"}, "delta_pose"),
         ({"randomised": ("light",)}, "lights"),
-        ({"catgories": ("laptop",)}, "categories"),
+        ({"category": ("laptop",)}, "categories"),
         ({"obs_mode": "points"}, "pointcloud"),
         ({"reward_mode": "dens"}, "dense"),
         ({"split": "training"}, "train"),
