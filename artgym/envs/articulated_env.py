@@ -61,6 +61,8 @@ CLOSING_START = (0.6, 0.9)
 #: What an episode draws at random besides its object and the part's start.
 RANDOMISED = ("placement", "hand", "camera", "table", "lights")
 
+#: Vertical field of view of cameras at given places, radians.
+FIELD_OF_VIEW = 0.65
 #: Objects drawn for an arm before it is an error that none is within its reach.
 _DRAWS = 20
 
@@ -259,11 +261,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         target, T_world_base, T_world_hand = self._draw_target(asked, fraction, source)
         obj, T_world_object, q = target.model, target.T_world_object, target.q
         others = self._surroundings(target, source("placement"))
-        cameras = self._view_distribution(obj)
-        views = [
-            cameras.sample(source("camera"), *self.camera_size)
-            for _ in range(self._observation_config.num_cameras)
-        ]
+        views = self._draw_views(obj, source("camera"))
         table = random_table(source("table"))
         light_seed = int(source("lights").integers(2**31))
         cloud_rng = np.random.default_rng(int(rng.integers(2**31)))
@@ -274,7 +272,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._object, self._T_world_object = obj, T_world_object
         self._T_world_base = T_world_base
         self._joint = obj.joint_of(self.target_part)
-        self._views = tuple(views)
+        self._views = views
         self._scene = scene = ManipulationScene(
             obj,
             T_world_object,
@@ -471,6 +469,18 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
             if self.target_part < obj.num_parts:
                 return obj
 
+    def _draw_views(self, obj: ArticulatedObject, rng: np.random.Generator) -> tuple[View, ...]:
+        """The cameras: where they were asked to be, or in front of the table."""
+        if self._Ts_world_camera is None:
+            cameras = self._view_distribution(obj)
+            count = self._observation_config.num_cameras
+            return tuple(cameras.sample(rng, *self.camera_size) for _ in range(count))
+        width, height = self.camera_size
+        return tuple(
+            View(T_world_camera=T, fov_y=FIELD_OF_VIEW, width=width, height=height)
+            for T in self._Ts_world_camera
+        )
+
     def _draw_target(
         self,
         asked: ArticulatedObject | None,
@@ -645,7 +655,7 @@ class ArtOpenEnv(ArticulatedEnv):
         camera_size: (width, height) of the observed pictures, pixels.
         num_cameras: how many cameras see the scene.
         camera_poses: where they stand, ``T_world_camera`` (4, 4) each with OpenCV axes, instead
-            of at random places.
+            of at random places; their vertical field of view is 0.65 rad.
         segmentation: whether pictures and clouds come with ``segmentation``.
         num_points: of a point cloud.
         reward_mode: "dense" or "sparse".

@@ -11,6 +11,7 @@ from artgym.envs import articulated_env
 from artgym.envs.articulated_env import ArtOpenEnv
 from artgym.envs.observations import STATE_FIELDS
 from artgym.geometry import transforms
+from artgym.geometry.camera import look_at
 from artgym.geometry.rotations import axis_angle_from_matrix
 from artgym.objects import catalog
 from artgym.objects.surface import grid_points
@@ -213,4 +214,26 @@ def test_sparse_reward_is_success():
     for _ in range(10):
         _, reward, *_, info = env.step(np.zeros(7, np.float32))
         assert reward == float(info["success"]) == 0.0
+    env.close()
+
+
+def test_cameras_stand_where_they_are_asked_to(render_system):
+    poses = [look_at([1.0, y, 0.8], [0.0, 0.0, 0.1]) for y in (-0.3, 0.3)]
+    env = ArtOpenEnv(obs_mode="rgbd", camera_poses=poses, camera_size=(64, 48))
+    for seed in range(2):
+        observation, _ = env.reset(seed=seed)
+        assert env.observation_space.contains(observation)
+        for name, pose in zip(("T_world_camera", "T_world_camera_1"), poses, strict=True):
+            np.testing.assert_allclose(observation[name].reshape(4, 4), pose, atol=1e-6)
+        assert not np.array_equal(observation["rgb"], observation["rgb_1"])
+    env.close()
+
+
+def test_what_is_not_randomised_is_the_same_every_time():
+    env = ArtOpenEnv(objects=("drawer/0003",), randomised=())
+    starts = [env.reset(seed=seed)[0] for seed in range(2)]
+    places = [fields(start) for start in starts]
+    for name in ("tcp_position", "joint_axis", "joint_pivot"):
+        np.testing.assert_array_equal(places[0][name], places[1][name])
+    assert places[0]["open_fraction"] != places[1]["open_fraction"]
     env.close()
