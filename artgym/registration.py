@@ -8,7 +8,7 @@ from typing import Any
 
 import gymnasium
 
-from artgym.objects.categories import CATEGORIES
+from artgym.categories import CATEGORIES
 
 
 @dataclass(frozen=True, kw_only=True)

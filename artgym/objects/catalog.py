@@ -14,9 +14,9 @@ from typing import Literal
 
 import numpy as np
 
+from artgym.categories import CATEGORIES, OTHER, Category, category
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.objects import store
-from artgym.objects.categories import CATEGORIES, OTHER, Category, category
 from artgym.objects.model import ArticulatedObject
 from artgym.objects.procedural import generator
 
