@@ -19,7 +19,13 @@ PACKAGES = ("artgym", "icaf4_policy", "benchmarks")
 ALLOWED_IMPORTS = {
     "artgym.errors": (),
     "artgym.geometry": ("artgym.geometry", "artgym.errors"),
-    "artgym.objects": ("artgym.objects", "artgym.geometry", "artgym.files", "artgym.errors"),
+    "artgym.objects": (
+        "artgym.objects",
+        "artgym.categories",
+        "artgym.geometry",
+        "artgym.files",
+        "artgym.errors",
+    ),
     "artgym.tasks": ("artgym.tasks", "artgym.objects", "artgym.geometry", "artgym.errors"),
     "artgym.sim": ("artgym.sim", "artgym.objects", "artgym.geometry", "artgym.errors"),
     "artgym": ("artgym",),
