@@ -259,9 +259,13 @@ def _parallel_outcomes(
 ) -> Generator[_Outcome, None, None]:
     """Outcomes in the order they come; no more than ``workers`` tasks are taken ahead."""
     # Threads are limited at start too: a library that a worker imports late is not seen otherwise.
-    options = (
-        {"inner_max_num_threads": 1, "initializer": _follow_parent} if backend == "loky" else {}
-    )
+    options: dict[str, Any] = {}
+    if backend == "loky":
+        options = {
+            "inner_max_num_threads": 1,
+            "initializer": _follow_parent,
+            "initargs": (os.getpid(),),
+        }
     with parallel_config(backend=backend, n_jobs=workers, **options):
         parallel = Parallel(
             return_as="generator_unordered",
@@ -274,11 +278,14 @@ def _parallel_outcomes(
             yield from outcomes
 
 
-def _follow_parent() -> None:
-    """Makes a worker end when its parent does, and only then."""
+def _follow_parent(parent: int) -> None:
+    """Makes a worker end when its parent does, and only then.
+
+    The parent may have died before the worker came so far: it says itself who it is.
+    """
     # Ctrl-C reaches every process of the terminal; the parent ends its workers itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
 
 
 def _end_with_parent(parent: int) -> None:

@@ -221,6 +221,13 @@ class TestDeaths:
                 assert process.wait(30) == 0
         assert folder_bytes(folder) == folder_bytes(tmp_path / "plain")
 
+    def test_a_worker_ends_whose_parent_died_before_it_began(self):
+        script = (
+            "import time\nfrom artgym.jobs import _follow_parent\n_follow_parent(1)\ntime.sleep(60)"
+        )
+        process = subprocess.run([sys.executable, "-c", script], timeout=30, check=False)
+        assert process.returncode == 1
+
     @pytest.mark.parametrize("workers", ["1", "2"])
     def test_ctrl_c_leaves_a_resumable_folder(self, tmp_path, workers):
         with _demo(tmp_path, workers) as process:
