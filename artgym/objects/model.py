@@ -300,13 +300,13 @@ class Link:
         """(3, 3), kg m^2, about the centre of mass, in the axes of the link's frame."""
         if self.inertial is not None:
             return np.asarray(self.inertial.inertia, dtype=float)
-        center, total = self.center_of_mass, np.zeros((3, 3))
-        for shape in self.shapes:
-            mass = self.density * shape.geometry.volume
-            R = np.asarray(shape.rotation, dtype=float)
-            d = shape.centroid_link - center
-            total += mass * (R @ shape.geometry.unit_inertia @ R.T)
-            total += mass * (d @ d * np.eye(3) - np.outer(d, d))
+        masses = self.density * np.array([s.geometry.volume for s in self.shapes])
+        R = np.array([s.rotation for s in self.shapes], dtype=float)
+        own = np.array([s.geometry.unit_inertia for s in self.shapes])
+        arms = np.array([s.centroid_link for s in self.shapes]) - self.center_of_mass
+        total = np.tensordot(masses, R @ own @ R.swapaxes(1, 2), axes=1)
+        weighted = masses[:, None] * arms
+        total += np.sum(weighted * arms) * np.eye(3) - weighted.T @ arms
         return total
 
     @cached_property

@@ -54,6 +54,10 @@ TABLE_HALF_SIZE = (0.75, 0.75, 0.02)
 JOINT_CREEP = 1e-8
 
 
+#: Joints slower than this, m/s or rad/s, are not damped.
+STILL = 1e-5
+
+
 @dataclass(frozen=True, kw_only=True)
 class PhysicsConfig:
     """How the simulator steps.
@@ -188,6 +192,7 @@ class ArticulatedBody:
         # The simulator counts q from the rest state, where all link frames coincide.
         self._offset = obj.rest_positions
         self._articulation.qpos = np.asarray(q, dtype=float) - self._offset
+        self._rests = False
         self._resistance = np.array([-joint.damping for joint in obj.joints])
 
     def positions(self) -> Array:
@@ -204,9 +209,14 @@ class ArticulatedBody:
 
     def resist(self) -> None:
         """Applies the joints' damping, and nothing else, during the coming step."""
-        # An effort, even of nothing, would wake what sleeps.
-        if not self.links[0].sleeping:
-            self._articulation.qf = self._resistance * self._articulation.qvel
+        velocities = self._articulation.qvel
+        still = max(map(abs, velocities.tolist()), default=0.0) < STILL
+        if not still:
+            self._articulation.qf = self._resistance * velocities
+        elif not self._rests:
+            self._articulation.qf = np.zeros(len(velocities))
+        # An effort, even of nothing, would keep awake what could sleep.
+        self._rests = still
 
     def link_poses(self) -> Array:
         """``Ts_world_link`` (K, 4, 4)."""

@@ -41,7 +41,7 @@ def gap(T_a, T_b):
     )
 
 
-def assert_inside_ranges(arm, slack=1e-3):
+def assert_inside_ranges(arm, slack=2e-3):
     chain, q = panda_chain(), np.array(arm.arm_positions())
     assert (q >= chain.lower - slack).all()
     assert (q <= chain.upper + slack).all()
