@@ -23,6 +23,7 @@ from artgym.envs import arguments
 from artgym.envs.articulated_env import ArtCloseEnv, ArticulatedEnv, ArtOpenEnv
 from artgym.envs.scene_env import ArtSceneEnv
 from artgym.errors import ArtgymError, InvalidArgumentError, NotReadyError, WorkerError
+from artgym.sim.robots import ACTION_SIZES
 
 #: Starting a process and its first picture take this many times as long as a step may.
 _START_PATIENCE = 12.0
@@ -242,6 +243,7 @@ class ArticulatedVectorEnv(VectorEnv[Any, Any, Any]):
         first = self._copies.envs[0]
         self.single_observation_space = first.observation_space
         self.single_action_space = first.action_space
+        self._action_size = ACTION_SIZES[first.control_mode]
         self.observation_space = batch_space(first.observation_space, num_envs)
         self.action_space = batch_space(first.action_space, num_envs)
         self._workers: list[_Worker] = []
@@ -299,6 +301,9 @@ class ArticulatedVectorEnv(VectorEnv[Any, Any, Any]):
                 f"actions: expected {self.num_envs} of them, one for each environment; got "
                 f"{actions if count < 0 else count}"
             )
+        for action in actions:
+            # All or none: a wrong one is found before any copy has moved.
+            arguments.read_action(action, self._action_size)
         observations, rewards, terminated, truncated, infos, finals = zip(
             *self._all("step", [actions]), strict=True
         )

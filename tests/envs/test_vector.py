@@ -137,6 +137,10 @@ def test_misuse():
     with pytest.raises(InvalidArgumentError, match="3 seeds for 2"):
         envs.reset(seed=[1, 2, 3])
     envs.reset(seed=0)
+    with pytest.raises(InvalidArgumentError, match="finite"):
+        envs.step([np.zeros(7), np.full(7, np.nan)])
+    # No copy has moved.
+    assert envs.step(np.zeros((2, 7), np.float32))[4]["elapsed_steps"].tolist() == [1, 1]
     with pytest.raises(InvalidArgumentError, match="expected 2 of them"):
         envs.step(np.zeros((3, 7), np.float32))
     envs.close()
