@@ -49,7 +49,7 @@ class RlConfig:
 
     env_id: str = "ArtOpenDrawer-v0"
     seeds: tuple[int, ...] = (0, 1, 2)
-    steps: int = 2_400_000
+    steps: int = 1_200_000
     copies: int = 16
     repeat: int = 2
     rollout: int = 256
