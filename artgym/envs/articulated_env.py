@@ -459,7 +459,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
 
     def _start_fraction(self, obj: ArticulatedObject) -> tuple[float, float]:
         """Interval of the open fraction at which an episode starts."""
-        raise NotImplementedError
+        return catalog.category_of(obj).start_fraction if self.direction > 0 else CLOSING_START
 
     def _draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
         """One of the objects that have the target part."""
@@ -672,9 +672,6 @@ class ArtOpenEnv(ArticulatedEnv):
 
     direction = 1.0
 
-    def _start_fraction(self, obj: ArticulatedObject) -> tuple[float, float]:
-        return catalog.category_of(obj).start_fraction
-
 
 class ArtCloseEnv(ArticulatedEnv):
     """Close a part of an articulated object.
@@ -698,6 +695,3 @@ class ArtCloseEnv(ArticulatedEnv):
     """
 
     direction = -1.0
-
-    def _start_fraction(self, obj: ArticulatedObject) -> tuple[float, float]:
-        return CLOSING_START
