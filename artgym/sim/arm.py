@@ -167,10 +167,6 @@ class PandaArm(PandaHand):
             np.clip(self._targets + turns, chain.lower + LIMIT_MARGIN, chain.upper - LIMIT_MARGIN)
         )
 
-    def joint_targets(self) -> Array:
-        """(7,): where the springs pull the joints to, radians."""
-        return self._targets.copy()
-
     def arm_positions(self) -> list[float]:
         """Of the seven joints, radians."""
         return self._articulation.qpos.tolist()[:NUM_JOINTS]
