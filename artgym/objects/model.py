@@ -11,15 +11,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from artgym.errors import InvalidArgumentError, UnknownNameError
-from artgym.geometry import transforms
-from artgym.geometry.rotations import quaternion_from_matrix
+from artgym.geometry import quaternions, transforms
+from artgym.geometry.rotations import cross, quaternion_from_matrix
 from artgym.geometry.screw import JointType, joint_motion
 from artgym.objects.contents import Image, TriangleMesh
 
@@ -127,37 +127,45 @@ class Convex:
                 f"a convex piece of {len(self.points)} points: expected 4 to 64"
             )
 
+    @cached_property
+    def _moments(self) -> tuple[float, Array, Array]:
+        return _hull_moments(self.corners(), self.triangles)
+
     @property
     def volume(self) -> float:
         """Cubic metres."""
-        return _hull_moments(self)[0]
+        return self._moments[0]
 
     @property
     def centroid(self) -> Array:
         """Centre of volume (3,) in the polyhedron's own frame."""
-        return _hull_moments(self)[1]
+        return self._moments[1]
 
     @property
     def unit_inertia(self) -> Array:
         """Inertia (3, 3) about the centroid for a mass of 1 kg."""
-        return _hull_moments(self)[2]
+        return self._moments[2]
 
-    @property
+    @cached_property
     def triangles(self) -> NDArray[np.intp]:
         """Faces (m, 3) of the hull as indices of points, seen counter-clockwise from outside."""
-        return _hull_triangles(self)
+        return _hull_triangles(self.corners())
+
+    @cached_property
+    def _corners(self) -> Array:
+        points = np.array(self.points, dtype=float)
+        points.setflags(write=False)
+        return points
 
     def corners(self) -> Array:
-        """Points (n, 3) whose convex hull is the shape."""
-        return np.asarray(self.points, dtype=float)
+        """Points (n, 3) whose convex hull is the shape; read-only."""
+        return self._corners
 
 
-@lru_cache(maxsize=4096)
-def _hull_triangles(convex: Convex) -> NDArray[np.intp]:
+def _hull_triangles(points: Array) -> NDArray[np.intp]:
     # It takes as long to load as a whole environment, and most objects have no such shape.
     from scipy.spatial import ConvexHull, QhullError
 
-    points = convex.corners()
     try:
         hull = ConvexHull(points)
     except QhullError:
@@ -166,24 +174,22 @@ def _hull_triangles(convex: Convex) -> NDArray[np.intp]:
         ) from None
     faces = hull.simplices.astype(np.intp)
     a, b, c = points[faces].swapaxes(0, 1)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    inward = np.einsum("ij,ij->i", cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inward] = faces[inward][:, ::-1]
     faces.setflags(write=False)
     return faces
 
 
-@lru_cache(maxsize=4096)
-def _hull_moments(convex: Convex) -> tuple[float, Array, Array]:
+def _hull_moments(points: Array, faces: NDArray[np.intp]) -> tuple[float, Array, Array]:
     """Volume, centroid and unit inertia, summed over tetrahedra from an inner point."""
-    points = convex.corners()
     inner = points.mean(axis=0)
-    a, b, c = (points - inner)[_hull_triangles(convex)].swapaxes(0, 1)
-    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    a, b, c = (points - inner)[faces].swapaxes(0, 1)
+    volumes = np.einsum("ij,ij->i", a, cross(b, c)) / 6.0
     volume = float(volumes.sum())
     corners_sum = a + b + c
     centroid = volumes @ corners_sum / 4.0 / volume
     # Second moments of a tetrahedron with a corner at the origin.
-    second = sum(np.einsum("i,ij,ik->jk", volumes, v, v) for v in (a, b, c, corners_sum)) / 20.0
+    second = sum((volumes[:, None] * v).T @ v for v in (a, b, c, corners_sum)) / 20.0
     second = second / volume - np.outer(centroid, centroid)
     inertia = np.trace(second) * np.eye(3) - second
     for array in (centroid, inertia):
@@ -315,7 +321,7 @@ class Link:
         moments, axes = np.linalg.eigh(self.inertia)
         if np.linalg.det(axes) < 0:
             axes[:, 0] *= -1
-        return moments, quaternion_from_matrix(axes)
+        return moments, np.array(quaternions.quaternion_from_rows(axes.tolist()))
 
     @cached_property
     def shape_quaternions(self) -> Array:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sapien import physx
 
 from artgym.geometry import quaternions
+from artgym.geometry.rotations import cross
 from artgym.geometry.transforms import transform_from
 from artgym.objects.contents import Image
 from artgym.objects.model import (
@@ -393,9 +394,9 @@ def _joint_frame(axis: Vector, pivot: Vector) -> sapien.Pose:
     """A frame at the pivot whose x is the joint's axis: the simulator's convention."""
     x = np.asarray(axis, dtype=float)
     helper = np.eye(3)[np.argmin(np.abs(x))]
-    y = np.cross(x, helper)
+    y = cross(x, helper)
     y = y / np.linalg.norm(y)
-    R = np.stack([x, y, np.cross(x, y)], axis=-1)
+    R = np.stack([x, y, cross(x, y)], axis=-1)
     return pose_from_transform(transform_from(R, pivot))
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from artgym.geometry.rotations import cross
 from artgym.objects.model import Box, Convex, Cylinder, Geometry
 
 Array = NDArray[np.floating]
@@ -171,10 +172,7 @@ def _surface(triangles: Array, weighted: Array, normals: Array) -> Surface:
 
 def _area_normals(triangles: Array) -> Array:
     """Outward normals (n, 3) of triangles (n, 3, 3), as long as twice their area."""
-    x, y, z = (triangles[:, 1] - triangles[:, 0]).T
-    u, v, w = (triangles[:, 2] - triangles[:, 0]).T
-    # By hand: np.cross takes ten times as long on so few.
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
+    return cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
 def _unit(vectors: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import cast
 
 import numpy as np
 
-from artgym.geometry.rotations import matrix_from_axis_angle
+from artgym.geometry.rotations import cross, matrix_from_axis_angle
 from artgym.objects.model import (
     Box,
     Convex,
@@ -141,7 +141,7 @@ def tube(
     angles = (np.arange(sides) + 0.5) * 2 * np.pi / sides
     pieces = []
     for i, d in enumerate(along):
-        up = np.cross(d, across)
+        up = cross(d, across)
         ring = np.cos(angles)[:, None] * across + flatness * np.sin(angles)[:, None] * up
         ends = []
         for at in (i, i + 1):
@@ -157,11 +157,11 @@ def tube(
 def _across(along: np.ndarray) -> np.ndarray:
     """Unit direction (3,) across the plane of the first bend of directions (n, 3)."""
     for d, e in pairwise(along):
-        normal = np.cross(d, e)
+        normal = cross(d, e)
         if np.linalg.norm(normal) > 1e-6:
             return normal / np.linalg.norm(normal)
     d = along[0]
-    level = np.cross([0.0, 0.0, 1.0], d)
+    level = cross([0.0, 0.0, 1.0], d)
     if np.linalg.norm(level) < 1e-6:
         return np.array([0.0, 1.0, 0.0])
     return level / np.linalg.norm(level)
