@@ -19,7 +19,7 @@ import sapien
 from artgym.errors import RendererUnavailableError
 from artgym.sim import vulkan
 
-#: "fast" draws in one pass lamps from afar and light from everywhere, in half the time of
+#: "fast" draws in one pass lamps from afar and light from everywhere, in a third of the time of
 #: "shadows", SAPIEN's smallest, which knows all kinds of lamps. Where both can, they agree.
 ShaderName = Literal["fast", "shadows"]
 _SHADERS: dict[ShaderName, str] = {

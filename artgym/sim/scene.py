@@ -49,6 +49,7 @@ Array = NDArray[np.floating]
 
 #: Half the side and half the thickness of the table's top, metres. Its surface is z = 0.
 TABLE_HALF_SIZE = (0.75, 0.75, 0.02)
+_TABLE_POSE = sapien.Pose([0, 0, -TABLE_HALF_SIZE[2]])
 
 #: A joint's dry friction is a damper whose force saturates: under a load that the friction holds,
 #: the joint creeps by less than this share of its range a second.
@@ -264,7 +265,7 @@ class ManipulationScene:
         self._system = cast(physx.PhysxCpuSystem, self.sapien_scene.physx_system)
         self._system.timestep = config.timestep
         visuals = render_system is not None
-        self._add_table(table_material if visuals else None)
+        self._add_table()
         placed = PlacedObject(model=obj, T_world_object=T_world_object, q=np.asarray(q))
         self.bodies = tuple(
             ArticulatedBody(
@@ -287,6 +288,9 @@ class ManipulationScene:
             self.hand = self._robot(T_world_base, T_world_hand, width, visuals)
             # Of an arm only the hand and its fingers count as touching.
             self._hand_links = {link: i for i, link in enumerate(self.hand.links[:3])}
+        if visuals and table_material is not None:
+            # Drawn last, what others hide of it costs nothing.
+            self._show_table(table_material)
 
     def _robot(
         self, T_world_base: Array | None, T_world_hand: Array, width: float, visuals: bool
@@ -306,18 +310,23 @@ class ManipulationScene:
             control=ArmControl(hand=control),
         )
 
-    def _add_table(self, material: Material | None) -> None:
+    def _add_table(self) -> None:
         entity = sapien.Entity()
         entity.name = "table"
         body = physx.PhysxRigidStaticComponent()
         body.attach(physx.PhysxCollisionShapeBox(TABLE_HALF_SIZE, _surface(0.8)))
         entity.add_component(body)
-        if material is not None:
-            shape = Shape(
-                geometry=Box(half_size=TABLE_HALF_SIZE), position=(0, 0, 0), material=material
-            )
-            entity.add_component(visual_body((shape,)))
-        entity.pose = sapien.Pose([0, 0, -TABLE_HALF_SIZE[2]])
+        entity.pose = _TABLE_POSE
+        self.sapien_scene.add_entity(entity)
+
+    def _show_table(self, material: Material) -> None:
+        shape = Shape(
+            geometry=Box(half_size=TABLE_HALF_SIZE), position=(0, 0, 0), material=material
+        )
+        entity = sapien.Entity()
+        entity.name = "table's looks"
+        entity.add_component(visual_body((shape,)))
+        entity.pose = _TABLE_POSE
         self.sapien_scene.add_entity(entity)
 
     def step(self, count: int = 1) -> None:

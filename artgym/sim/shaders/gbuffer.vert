@@ -1,5 +1,5 @@
 #version 450
-// Where a vertex and its normal are, seen from the camera.
+// Where a vertex and its normal are, in the world and seen from the camera.
 // Names, sets and bindings are those by which SAPIEN fills the buffers.
 
 layout(set = 0, binding = 0) uniform CameraBuffer {
@@ -27,17 +27,17 @@ layout(location = 2) in vec2 uv;
 layout(location = 3) in vec3 tangent;
 layout(location = 4) in vec3 bitangent;
 
-layout(location = 0) out vec3 positionCamera;
-layout(location = 1) out vec3 normalCamera;
+layout(location = 0) out vec3 positionWorld;
+layout(location = 1) out vec3 normalWorld;
 layout(location = 2) out vec2 texturePlace;
-layout(location = 3) out flat uint entity;
 
 void main() {
-  mat4 modelView = cameraBuffer.viewMatrix * objectTransformBuffer.modelMatrix;
-  vec4 place = modelView * vec4(position, 1.0);
-  positionCamera = place.xyz;
-  normalCamera = transpose(inverse(mat3(modelView))) * normal;
+  vec4 world = objectTransformBuffer.modelMatrix * vec4(position, 1.0);
+  positionWorld = world.xyz;
+  // A turn and a scale along each axis: normals shrink where lengths grow.
+  mat3 model = mat3(objectTransformBuffer.modelMatrix);
+  vec3 scale2 = vec3(dot(model[0], model[0]), dot(model[1], model[1]), dot(model[2], model[2]));
+  normalWorld = model * (normal / scale2);
   texturePlace = uv;
-  entity = objectDataBuffer.segmentation[1];
-  gl_Position = cameraBuffer.projectionMatrix * place;
+  gl_Position = cameraBuffer.projectionMatrix * (cameraBuffer.viewMatrix * world);
 }
