@@ -29,8 +29,8 @@ there was a choice, the one that is faster for ManiSkill was taken:
 - Reset: draws as ours does; the scene stays, which is ManiSkill's way. Another object takes
   ``options=dict(reconfigure=True)``: ManiSkill builds its scene anew then.
 
-Only what ManiSkill imports anyway and the rule of success are imported here, so that it does not
-pay for our packages.
+Only what ManiSkill imports anyway and the rules of contact, reward and success are imported here,
+so that it does not pay for our packages.
 """
 
 from __future__ import annotations
@@ -49,6 +49,8 @@ from mani_skill.utils.registration import register_env
 from mani_skill.utils.structs import Link, Pose
 from mani_skill.utils.structs.types import SimConfig
 
+from artgym.sim.contact import part_contact
+from artgym.tasks.rewards import GRIP, MOVE, REACH, REACH_SCALE
 from artgym.tasks.success import TRAVEL_THRESHOLD, Progress
 from benchmarks.twin_asset import TwinAsset
 
@@ -199,35 +201,17 @@ class OpenTwinEnv(BaseEnv):
         q = self.object.get_qpos()[:, asset.joint_index]
         return (q - asset.closed) / (asset.open - asset.closed)
 
-    def _contact(self) -> tuple[bool, bool]:
-        """Whether the hand touches the part, and whether the fingers have it between them."""
-        target, push, touched = self._target_body, [0.0, 0.0, 0.0], False
-        closing = None
-        for contact in self.scene.get_contacts():
-            first, second = contact.bodies
-            if first is target:
-                finger, sign = self._bodies.get(second), -1.0
-            elif second is target:
-                finger, sign = self._bodies.get(first), 1.0
-            else:
-                continue
-            if finger is None:
-                continue
-            points: list[Any] = contact.points
-            impulse = sum(point.impulse for point in points)
-            if not np.any(impulse):
-                continue
-            touched = True
-            if closing is None:
-                pose = self._hand.pose.sp.to_transformation_matrix()
-                closing = pose[:3, 1]
-            push[finger] += sign * float(closing @ impulse)
-        return touched, push[1] > 0.0 > push[2]
+    def _closing(self) -> Any:
+        return self._hand.pose.sp.to_transformation_matrix()[:3, 1]
 
     def evaluate(self) -> dict[str, Any]:
         """Success by our rule, and what reward and observation need of it."""
-        touched, pinched = self._contact()
-        self._progress = progress = self._progress.advance(self._open_fraction(), touched, pinched)
+        contact = part_contact(
+            self.scene.get_contacts(), self._target_body, self._bodies, self._closing
+        )
+        self._progress = progress = self._progress.advance(
+            self._open_fraction(), contact.touched, contact.pinched
+        )
         part = self.part.pose
         grip_point = (part * Pose.create_from_pq(self._grip_point_part)).p
         return {
@@ -236,7 +220,7 @@ class OpenTwinEnv(BaseEnv):
             "travel": progress.travel,
             "engaged": progress.engaged,
             "open_fraction": progress.fraction,
-            "pinched": pinched,
+            "pinched": contact.pinched,
             "grip_point": grip_point,
         }
 
@@ -261,8 +245,8 @@ class OpenTwinEnv(BaseEnv):
         tcp = self.agent.tcp.pose.p  # pyright: ignore[reportAttributeAccessIssue]
         distance = torch.linalg.norm(info["grip_point"] - tcp, dim=1)
         moved = torch.clamp(info["travel"] / TRAVEL_THRESHOLD, max=1.0)
-        reach = 0.2 * (1.0 - torch.tanh(distance / 0.2))
-        return reach + 0.2 * info["pinched"] + 0.6 * moved * info["engaged"]
+        reach = REACH * (1.0 - torch.tanh(distance / REACH_SCALE))
+        return reach + GRIP * info["pinched"] + MOVE * moved * info["engaged"]
 
     def compute_normalized_dense_reward(
         self, obs: Any, action: torch.Tensor, info: dict[str, Any]

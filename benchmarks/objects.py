@@ -5,6 +5,7 @@ Run ``python -m benchmarks.objects --help``.
 
 from __future__ import annotations
 
+import functools
 import sys
 import time
 from collections.abc import Sequence
@@ -158,16 +159,12 @@ def measure(config: ObjectsConfig) -> dict[str, Any]:
     Raises:
         DamagedFileError: there is an ``objects.json`` to resume that cannot be read.
     """
-    path = config.out / "objects.json"
-    options = {n: v for n, v in asdict(config).items() if n in ("sound", "opened", "seed")}
-    rows = record.kept_rows(path, options) if config.resume else {}
-    result: dict[str, Any] = {}
-    for category in config.category:
-        if category not in rows:
-            rows[category] = measure_category(category, config)
-        result = {"config": options, "rows": dict(sorted(rows.items()))}
-        record.write_result(path, result)
-    return result
+    return record.measure_rows(
+        config.out / "objects.json",
+        {n: v for n, v in asdict(config).items() if n in ("sound", "opened", "seed")},
+        {c: functools.partial(measure_category, c, config) for c in config.category},
+        resume=config.resume,
+    )
 
 
 def table_from_rows(rows: dict[str, dict[str, Any]]) -> Table:

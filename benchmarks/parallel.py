@@ -13,15 +13,11 @@ from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 from tqdm import tqdm
 
-from artgym.errors import ArtgymError, InvalidArgumentError
+from artgym.errors import InvalidArgumentError, WorkerError
 from benchmarks.threads import ONE_THREAD
 
 T = TypeVar("T")
 R = TypeVar("R")
-
-
-class WorkerDiedError(ArtgymError, RuntimeError):
-    """A worker process ended without an answer."""
 
 
 def results_in_order(
@@ -46,7 +42,7 @@ def results_in_order(
 
     Raises:
         InvalidArgumentError: fewer than one worker.
-        WorkerDiedError: a worker was killed or crashed.
+        WorkerError: a worker was killed or crashed.
     """
     if workers < 1:
         raise InvalidArgumentError(f"workers={workers}: expected 1 or more.")
@@ -68,7 +64,7 @@ def results_in_order(
                 results[numbers[future]] = future.result()
                 bar.update()
     except TerminatedWorkerError as error:
-        raise WorkerDiedError(
+        raise WorkerError(
             "a worker process died (killed by the system, often for want of memory, or crashed in "
             "native code). Repeat the command with fewer --workers."
         ) from error

@@ -9,6 +9,7 @@ import platform
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -105,12 +106,40 @@ def write_result(path: Path, result: dict[str, Any]) -> None:
     write_file_whole(path, (json_text(_json_value(result)) + "\n").encode())
 
 
-def kept_rows(path: Path, config: dict[str, Any]) -> dict[str, Any]:
-    """The rows of a result that an earlier run with the same config wrote; else none.
+def measure_rows(
+    path: Path,
+    config: dict[str, Any],
+    rows: Mapping[str, Callable[[], dict[str, Any]]],
+    *,
+    resume: bool,
+) -> dict[str, Any]:
+    """Measures a result row by row, and writes it after each.
+
+    Args:
+        path: of the result.
+        config: the options that the rows depend on.
+        rows: measures each row, by name.
+        resume: whether rows that an earlier run with the same config wrote are kept.
+
+    Returns:
+        The result: ``config``, and ``rows`` by name in alphabetical order.
 
     Raises:
-        DamagedFileError: there is a file, and it cannot be read.
+        DamagedFileError: there is a result to resume, and it cannot be read.
+        FileNotWrittenError: the system refused.
     """
+    measured = _kept_rows(path, config) if resume else {}
+    result = {"config": config, "rows": measured}
+    for name, measure in rows.items():
+        if name not in measured:
+            measured[name] = measure()
+        result["rows"] = dict(sorted(measured.items()))
+        write_result(path, result)
+    return result
+
+
+def _kept_rows(path: Path, config: dict[str, Any]) -> dict[str, Any]:
+    """The rows of a result that an earlier run with the same config wrote; else none."""
     if not path.exists():
         return {}
     try:

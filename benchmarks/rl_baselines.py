@@ -5,10 +5,11 @@ Run ``python -m benchmarks.rl_baselines --help``.
 
 from __future__ import annotations
 
+import functools
 import io
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,7 @@ class RlConfig:
         discount: of rewards to come.
         layers: widths of the policy's and the value's networks.
         episodes: on as many test objects, once each, is a policy scored.
+        resume: keep the seeds that ``rl_baselines.json`` holds already.
         workers: processes that step the copies; 0 steps them where the policy learns.
         out: folder for rl_baselines.json and the curves, rl_baselines.png.
     """
@@ -59,6 +61,7 @@ class RlConfig:
     discount: float = 0.98
     layers: tuple[int, ...] = (256, 256)
     episodes: int = 50
+    resume: bool = False
     workers: int = 2
     out: Path = record.RESULTS_FOLDER
 
@@ -139,7 +142,7 @@ def train(config: RlConfig, seed: int) -> dict[str, Any]:
         return model.predict(envs.normalize_obs(observation), deterministic=True)[0]
 
     return {
-        "seed": seed,
+        **record.provenance("benchmarks.rl_baselines"),
         "learning_seconds": learned,
         "curve": curve,
         **score(config, act),
@@ -176,23 +179,31 @@ def score(config: RlConfig, act: Any) -> dict[str, Any]:
 
 
 def measure(config: RlConfig) -> dict[str, Any]:
-    """Learns with every seed; a result for ``record.write_result``."""
-    return {
-        **record.provenance("benchmarks.rl_baselines"),
-        "config": asdict(config),
-        "rows": [train(config, seed) for seed in config.seeds],
-    }
+    """Learns with every seed, and writes ``rl_baselines.json`` after each.
+
+    With ``resume``, what seeds learned before with the same options is kept.
+
+    Raises:
+        DamagedFileError: there is an ``rl_baselines.json`` to resume that cannot be read.
+    """
+    apart = ("seeds", "resume", "out")
+    return record.measure_rows(
+        config.out / "rl_baselines.json",
+        {name: value for name, value in asdict(config).items() if name not in apart},
+        {f"seed {seed}": functools.partial(train, config, seed) for seed in config.seeds},
+        resume=config.resume,
+    )
 
 
-def table_from_rows(rows: Sequence[dict[str, Any]]) -> Table:
+def table_from_rows(rows: Mapping[str, Mapping[str, Any]]) -> Table:
     """The table for a person to read."""
     table = Table(title="PPO: success on objects never seen")
-    for name in ("seed", "success, %", "Wilson 95 %", "gripped, %", "learned in, min"):
+    for name in ("", "success, %", "Wilson 95 %", "gripped, %", "learned in, min"):
         table.add_column(name, justify="right")
-    for row in rows:
+    for name, row in rows.items():
         low, high = row["success_interval"]
         table.add_row(
-            str(row["seed"]),
+            name,
             f"{100 * row['success']:.0f}",
             f"{100 * low:.0f}-{100 * high:.0f}",
             f"{100 * row['success_gripped']:.0f}",
@@ -201,13 +212,13 @@ def table_from_rows(rows: Sequence[dict[str, Any]]) -> Table:
     return table
 
 
-def draw_curves(rows: Sequence[dict[str, Any]], path: Path) -> None:
+def draw_curves(rows: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     """Success in training over control steps, a line a seed, as a PNG."""
     import matplotlib.figure
 
     figure = matplotlib.figure.Figure(figsize=(6, 4), layout="constrained")
     axes = figure.add_subplot()
-    for row in rows:
+    for name, row in rows.items():
         points = np.array([[p["steps"], p["success"]] for p in row["curve"]]).reshape(-1, 2)
         # The mean of what lies about a point: a few episodes end between two updates.
         size = max(1, min(9, len(points)))
@@ -215,7 +226,7 @@ def draw_curves(rows: Sequence[dict[str, Any]], path: Path) -> None:
             points[i : i + size].mean(axis=0) for i in range(0, max(0, len(points) - size + 1))
         ]
         at, success = np.array(means).reshape(-1, 2).T
-        axes.plot(at / 1e6, 100 * success, label=f"seed {row['seed']}")
+        axes.plot(at / 1e6, 100 * success, label=name)
     axes.set(xlabel="control steps, millions", ylabel="success in training, %", ylim=(0, 100))
     axes.legend()
     axes.grid(alpha=0.3)
@@ -226,10 +237,9 @@ def draw_curves(rows: Sequence[dict[str, Any]], path: Path) -> None:
 
 def report(config: RlConfig) -> list[Table]:
     """Learns, writes ``rl_baselines.json`` and the curves, and gives the table."""
-    result = measure(config)
-    record.write_result(config.out / "rl_baselines.json", result)
-    draw_curves(result["rows"], config.out / "rl_baselines.png")
-    return [table_from_rows(result["rows"])]
+    rows = measure(config)["rows"]
+    draw_curves(rows, config.out / "rl_baselines.png")
+    return [table_from_rows(rows)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

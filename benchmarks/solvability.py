@@ -5,6 +5,7 @@ Run ``python -m benchmarks.solvability --help``.
 
 from __future__ import annotations
 
+import functools
 import sys
 import time
 from collections.abc import Sequence
@@ -115,19 +116,19 @@ def measure(config: SolvabilityConfig) -> dict[str, Any]:
     Raises:
         DamagedFileError: there is a ``solvability.json`` to resume that cannot be read.
     """
-    path = config.out / "solvability.json"
-    options = {n: v for n, v in asdict(config).items() if n in ("objects", "seed", "policy")}
-    rows = record.kept_rows(path, options) if config.resume else {}
-    result: dict[str, Any] = {"config": options, "rows": rows}
-    for env_id in config.env_id:
-        for robot in config.robot:
-            for category in config.category:
-                name = f"{env_id} {robot} {category}"
-                if name not in rows:
-                    rows[name] = measure_row(env_id, robot, category, config)
-                result = {"config": options, "rows": dict(sorted(rows.items()))}
-                record.write_result(path, result)
-    return result
+    return record.measure_rows(
+        config.out / "solvability.json",
+        {n: v for n, v in asdict(config).items() if n in ("objects", "seed", "policy")},
+        {
+            f"{env_id} {robot} {category}": functools.partial(
+                measure_row, env_id, robot, category, config
+            )
+            for env_id in config.env_id
+            for robot in config.robot
+            for category in config.category
+        },
+        resume=config.resume,
+    )
 
 
 def table_from_rows(rows: dict[str, dict[str, Any]]) -> Table:

@@ -22,6 +22,7 @@ from artgym.geometry import quaternions, transforms
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject
 from artgym.sim.camera import RenderedCamera, View, ViewDistribution
+from artgym.sim.contact import PartContact
 from artgym.sim.renderer import own_render_system
 from artgym.sim.robots import (
     ACTION_SIZES,
@@ -31,7 +32,7 @@ from artgym.sim.robots import (
     T_hand_tcp,
     hand_from_tcp,
 )
-from artgym.sim.scene import ManipulationScene, PartContact, PlacedObject, Reading
+from artgym.sim.scene import ManipulationScene, PlacedObject, Reading
 from artgym.sim.setting import add_lights, random_hand_start, random_placement, random_table
 from artgym.tasks import rewards
 from artgym.tasks.rewards import RewardMode

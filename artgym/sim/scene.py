@@ -10,7 +10,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 import sapien
@@ -34,6 +34,7 @@ from artgym.objects.model import (
     Visual,
 )
 from artgym.objects.textures import texture_pixels
+from artgym.sim.contact import PartContact, part_contact
 from artgym.sim.conversion import (
     pose_from_transform,
     poses_from_transforms,
@@ -126,19 +127,6 @@ class Reading(NamedTuple):
             and all([-farthest < v < farthest for v in self.part_position])
             and all([-math.inf < v < math.inf for v in self.q])
         )
-
-
-@dataclass(frozen=True)
-class PartContact:
-    """How the hand touches a part at one instant.
-
-    Attributes:
-        touched: some link of the hand presses on the part.
-        pinched: both fingers press on it, from opposite sides.
-    """
-
-    touched: bool
-    pinched: bool
 
 
 class ArticulatedBody:
@@ -369,29 +357,13 @@ class ManipulationScene:
     def contact(self, part: int) -> PartContact:
         """How the hand touches a part, from the last step's contacts."""
         assert self.hand is not None
-        target = self.body.links[part]
-        touched, push = False, [0.0, 0.0, 0.0]
-        closing = None
-        for contact in self._system.get_contacts():
-            first, second = contact.bodies
-            if first is target:
-                finger, sign = self._hand_links.get(second), -1.0
-            elif second is target:
-                finger, sign = self._hand_links.get(first), 1.0
-            else:
-                continue
-            if finger is None:
-                continue
-            points: list[Any] = contact.points
-            impulse = sum(point.impulse for point in points)
-            if not np.any(impulse):
-                continue
-            touched = True
-            if closing is None:
-                closing = transform_from_pose(self.hand.links[0].entity_pose)[:3, 1]
-            push[finger] += sign * float(closing @ impulse)
-        # The part presses the left finger outwards along +y and the right one along -y.
-        return PartContact(touched=touched, pinched=push[1] > 0.0 > push[2])
+        return part_contact(
+            self._system.get_contacts(), self.body.links[part], self._hand_links, self._closing
+        )
+
+    def _closing(self) -> Array:
+        assert self.hand is not None
+        return transform_from_pose(self.hand.links[0].entity_pose)[:3, 1]
 
     def close(self) -> None:
         """Takes everything out of the scene; a shared renderer keeps nothing of it."""

@@ -13,7 +13,7 @@ RewardMode = Literal["dense", "sparse"]
 REACH, GRIP, MOVE = 0.2, 0.2, 0.6
 
 #: Distance at which the reach term has fallen to about a quarter, metres.
-_REACH_SCALE = 0.2
+REACH_SCALE = 0.2
 
 
 def dense_terms(
@@ -29,7 +29,7 @@ def dense_terms(
     """
     moved = min(max(float(progress.headway(direction)) / TRAVEL_THRESHOLD, 0.0), 1.0)
     return {
-        "reach": REACH * (1.0 - math.tanh(distance / _REACH_SCALE)),
+        "reach": REACH * (1.0 - math.tanh(distance / REACH_SCALE)),
         "grip": GRIP * float(pinched),
         "move": MOVE * moved * float(progress.engaged),
     }

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from artgym.errors import InvalidArgumentError
-from benchmarks.rl_baselines import RlConfig, report
+from benchmarks.rl_baselines import RlConfig, measure, report
 from benchmarks.sb3_copies import Sb3Copies
 
 
@@ -18,11 +19,13 @@ def test_learns_scores_and_draws(tmp_path):
         workers=0, out=tmp_path,
     )  # fmt: skip
     (table,) = report(config)
-    (row,) = json.loads((tmp_path / "rl_baselines.json").read_text())["rows"]
+    rows = json.loads((tmp_path / "rl_baselines.json").read_text())["rows"]
+    row = rows["seed 0"]
     assert row["episodes"] == 2
     assert 0.0 <= row["success"] <= 1.0
     assert (tmp_path / "rl_baselines.png").read_bytes().startswith(b"\x89PNG")
     assert table.row_count == 1
+    assert measure(replace(config, resume=True))["rows"] == rows
 
 
 def test_an_action_is_kept_up_and_an_end_cuts_off():
