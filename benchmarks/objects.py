@@ -23,9 +23,8 @@ from artgym.sim import soundness
 from artgym.sim.scene import ManipulationScene
 from benchmarks import record
 from benchmarks.command import run
-from benchmarks.episodes import episode_tasks, outcomes, run_in_worker
 from benchmarks.parallel import results_in_order
-from benchmarks.rates import aggregate
+from benchmarks.solvability import solved
 
 #: Policies whose episodes are run: the expert must open, doing nothing must not.
 _POLICIES = ("expert", "zero")
@@ -108,26 +107,13 @@ def measure_category(category: str, config: ObjectsConfig) -> dict[str, Any]:
     (hashes,) = results_in_order(
         _hashes, [ids[::-1]], workers=1, description=f"{category}: same bytes", unit="process"
     )
-    tasks = [
-        task
-        for policy in _POLICIES
-        for task in episode_tasks(
-            policy,
-            category,
-            "test",
-            config.opened,
-            1,
-            seed=config.seed,
-            weights=None,
-            parts="in turn",
-        )
-    ]
-    episodes = results_in_order(
-        run_in_worker,
-        tasks,
+    rates, unsolved = solved(
+        _POLICIES,
+        category,
+        config.opened,
+        seed=config.seed,
         workers=config.workers,
         description=f"{category}: episodes",
-        unit="episode",
     )
     (times,) = results_in_order(
         _build_times, [category], workers=1, description=f"{category}: build times", unit="process"
@@ -139,14 +125,10 @@ def measure_category(category: str, config: ObjectsConfig) -> dict[str, Any]:
         "same_bytes": sum(
             v["hash"] == again for v, again in zip(verdicts, hashes[::-1], strict=True)
         ),
-        **{p: aggregate(outcomes(episodes, p, category)) for p in _POLICIES},
+        **rates,
         "build_ms": {"median": float(np.median(times)), "largest": times[-1]},
         "failures": {v["object_id"]: v["failures"] for v in verdicts if v["failures"]},
-        "not_opened": [
-            {name: getattr(e, name) for name in ("object_id", "part", "seed", "travel", "engaged")}
-            for e in outcomes(episodes, "expert", category)
-            if not e.success
-        ],
+        "not_opened": unsolved,
         "seconds": round(time.perf_counter() - began, 1),
     }
 

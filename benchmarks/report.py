@@ -102,7 +102,8 @@ def perception_block(result: Mapping[str, Any]) -> str:
 def objects_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``objects.json``, a category a line."""
     lines = [
-        "| category | sound | opened by the expert | gripped | zero action | id to scene, ms: median, largest |",
+        "| category | sound | opened by the expert | gripped | zero action "
+        "| id to scene, ms: median, largest |",
         "|---|---|---|---|---|---|",
     ]
     for category, row in result["rows"].items():

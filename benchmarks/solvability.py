@@ -22,7 +22,7 @@ from artgym.registration import environment_ids
 from artgym.sim.robots import RobotName
 from benchmarks import record
 from benchmarks.command import run
-from benchmarks.episodes import EpisodeTask, episode_tasks, outcomes, run_in_worker
+from benchmarks.episodes import episode_tasks, outcomes, run_in_worker
 from benchmarks.parallel import results_in_order
 from benchmarks.rates import aggregate
 
@@ -68,42 +68,70 @@ class SolvabilityConfig:
             require_known("policy", policy, POLICIES)
 
 
+def solved(
+    policies: Sequence[str],
+    category: str,
+    objects: int,
+    *,
+    seed: int,
+    workers: int,
+    description: str,
+    env_id: str = "ArtOpen-v0",
+    robot: RobotName = "hand",
+) -> tuple[dict[str, dict[str, Any]], list[dict[str, Any]]]:
+    """Runs policies on test objects of a category, one episode each, the parts in turn.
+
+    Returns:
+        The rates of each policy, and the expert's episodes without success.
+    """
+    tasks = [
+        task
+        for policy in policies
+        for task in episode_tasks(
+            policy,
+            category,
+            "test",
+            objects,
+            1,
+            seed=seed,
+            parts="in turn",
+            env_id=env_id,
+            robot=robot,
+        )
+    ]
+    episodes = results_in_order(
+        run_in_worker, tasks, workers=workers, description=description, unit="episode"
+    )
+    unsolved = [
+        {name: getattr(e, name) for name in ("object_id", "part", "seed", "travel", "engaged")}
+        for e in outcomes(episodes, "expert", category)
+        if not e.success
+    ]
+    return {p: aggregate(outcomes(episodes, p, category)) for p in policies}, unsolved
+
+
 def measure_row(
     env_id: str, robot: RobotName, category: str, config: SolvabilityConfig
 ) -> dict[str, Any]:
     """The row of one environment, robot and category, with how it was made."""
     began = time.perf_counter()
-    tasks: list[EpisodeTask] = []
-    for policy in config.policy:
-        tasks += episode_tasks(
-            policy,
-            category,
-            "test",
-            config.objects,
-            1,
-            seed=config.seed,
-            parts="in turn",
-            env_id=env_id,
-            robot=robot,
-        )
-    episodes = results_in_order(
-        run_in_worker,
-        tasks,
+    rates, unsolved = solved(
+        config.policy,
+        category,
+        config.objects,
+        seed=config.seed,
         workers=config.workers,
         description=f"{env_id}, {robot}, {category}",
-        unit="episode",
+        env_id=env_id,
+        robot=robot,
     )
     return {
         **record.provenance("benchmarks.solvability"),
         "env_id": env_id,
         "robot": robot,
         "category": category,
-        **{p: aggregate(outcomes(episodes, p, category)) for p in config.policy},
-        "not_solved": [
-            {name: getattr(e, name) for name in ("object_id", "part", "seed", "travel", "engaged")}
-            for e in outcomes(episodes, "expert", category)
-            if not e.success
-        ],
+        **rates,
+        "not_solved": unsolved,
         "seconds": round(time.perf_counter() - began, 1),
     }
 
