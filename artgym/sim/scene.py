@@ -37,11 +37,10 @@ from artgym.objects.textures import texture_pixels
 from artgym.sim.contact import PartContact, part_contact
 from artgym.sim.conversion import (
     pose_from_transform,
-    poses_from_transforms,
     transform_from_pose,
 )
 from artgym.sim.robots import FloatingHand, HandControl, tcp_from_hand
-from artgym.sim.surfaces import Surface, flat_surface, piece_surface
+from artgym.sim.surfaces import flat_surface, piece_surface
 
 if TYPE_CHECKING:
     from artgym.sim.arm import PandaArm
@@ -424,35 +423,34 @@ def link_visual(link: Link) -> sapien.render.RenderBodyComponent:
 
 
 def visual_body(shapes: Sequence[Shape]) -> sapien.render.RenderBodyComponent:
-    """What cameras see of shapes."""
+    """What cameras see of shapes: one mesh of all that look alike, since each costs a picture."""
     body = sapien.render.RenderBodyComponent()
-    if not shapes:
-        return body
-    materials: dict[Material, sapien.render.RenderMaterial] = {}
-    # All at once: one quaternion takes as long as forty.
-    poses = poses_from_transforms(np.stack([piece.T_link_shape for piece in shapes]))
-    for piece, pose in zip(shapes, poses, strict=True):
-        look = piece.material
-        if look not in materials:
-            materials[look] = _render_material(look)
-        material, geometry = materials[look], piece.geometry
-        # Without a picture to lay over them, boxes and cylinders are cheapest as such.
-        if isinstance(look.texture, Texture):
-            surface = piece_surface(geometry)
-            # Neighbours that are parallel share one picture that runs on from piece to piece.
-            offset = np.asarray(piece.position) @ np.asarray(piece.rotation, dtype=float)
-            shape = _triangle_shape(surface, surface.uv(offset, look.texture.tile), material)
-        elif isinstance(geometry, Cylinder):
-            shape = sapien.render.RenderShapeCylinder(
-                geometry.radius, geometry.half_length, material
-            )
-        elif isinstance(geometry, Box):
-            shape = sapien.render.RenderShapeBox(geometry.half_size, material)
-        else:
-            shape = _triangle_shape(piece_surface(geometry), None, material)
-        shape.local_pose = pose
-        body.attach(shape)
+    alike: dict[Material, list[Shape]] = {}
+    for piece in shapes:
+        alike.setdefault(piece.material, []).append(piece)
+    for look, pieces in alike.items():
+        body.attach(_joined_shape(pieces, look))
     return body
+
+
+def _joined_shape(pieces: Sequence[Shape], look: Material) -> sapien.render.RenderShapeTriangleMesh:
+    """Pieces of one material as one mesh in their link's frame."""
+    vertices, normals, uv = [], [], []
+    for piece in pieces:
+        surface = piece_surface(piece.geometry)
+        R = np.asarray(piece.rotation, dtype=float)
+        position = np.asarray(piece.position, dtype=float)
+        vertices.append(surface.vertices @ R.T + position)
+        normals.append(surface.normals @ R.T)
+        if isinstance(look.texture, Texture):
+            # Neighbours that are parallel share one picture that runs on from piece to piece.
+            uv.append(surface.uv(position @ R, look.texture.tile))
+    return _triangle_shape(
+        np.concatenate(vertices),
+        np.concatenate(normals),
+        np.concatenate(uv) if uv else None,
+        _render_material(look),
+    )
 
 
 def _mesh_shape(visual: Visual) -> sapien.render.RenderShapeTriangleMesh:
@@ -466,7 +464,7 @@ def _mesh_shape(visual: Visual) -> sapien.render.RenderShapeTriangleMesh:
         uv = surface.uv(np.zeros(3), look.texture.tile)
     elif mesh.uv is not None:
         uv = mesh.uv[mesh.faces].reshape(-1, 2)
-    return _triangle_shape(surface, uv, _render_material(look))
+    return _triangle_shape(surface.vertices, surface.normals, uv, _render_material(look))
 
 
 def _render_material(look: Material) -> sapien.render.RenderMaterial:
@@ -490,14 +488,17 @@ def _render_texture(texture: Texture | Image, color: Vector) -> sapien.render.Re
 
 
 def _triangle_shape(
-    surface: Surface, uv: Array | None, material: sapien.render.RenderMaterial
+    vertices: Array, normals: Array, uv: Array | None, material: sapien.render.RenderMaterial
 ) -> sapien.render.RenderShapeTriangleMesh:
-    """Triangles; uv (3 n, 2) are picture coordinates of their corners, v upwards."""
+    """Triangles by their corners (3 n, 3); uv (3 n, 2) are picture coordinates, v upwards."""
     if uv is None:
-        uv = np.zeros((len(surface.vertices), 2), dtype=np.float32)
-    else:
-        # The renderer counts a picture's rows from the top.
-        uv = (uv * [1.0, -1.0] + [0.0, 1.0]).astype(np.float32)
+        uv = np.zeros((len(vertices), 2))
+    # The renderer counts a picture's rows from the top.
+    uv = uv * [1.0, -1.0] + [0.0, 1.0]
     return sapien.render.RenderShapeTriangleMesh(
-        surface.vertices, surface.triangles, surface.normals, uv, material
+        vertices.astype(np.float32),
+        np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3),
+        normals.astype(np.float32),
+        uv.astype(np.float32),
+        material,
     )

@@ -24,11 +24,10 @@ _CREASE = np.radians(40.0)
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles in a piece's own frame, each with corners of its own.
+    """Triangles in a piece's own frame, each with three corners of its own.
 
     Attributes:
-        vertices: (3 n, 3), metres.
-        triangles: (n, 3) indices of vertices, counter-clockwise from outside.
+        vertices: corners (3 n, 3), counter-clockwise from outside, metres.
         normals: (3 n, 3), unit, outwards.
         sides: (3 n,) axis along which a corner is projected: 0, 1, 2, or 3 where it is rolled
             off a cylinder.
@@ -37,7 +36,6 @@ class Surface:
     """
 
     vertices: NDArray[np.float32]
-    triangles: NDArray[np.uint32]
     normals: NDArray[np.float32]
     sides: NDArray[np.intp]
     longest: int
@@ -147,7 +145,6 @@ def _cylinder_surface(cylinder: Cylinder) -> Surface:
     angles = np.stack(side_turn, 1).ravel()
     return Surface(
         vertices=vertices.astype(np.float32),
-        triangles=np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3),
         normals=normals.astype(np.float32),
         sides=np.repeat([3, 0], len(angles)),
         longest=0,
@@ -162,7 +159,6 @@ def _surface(triangles: Array, weighted: Array, normals: Array) -> Surface:
     sides = np.abs(weighted).argmax(axis=1)
     return Surface(
         vertices=vertices.astype(np.float32),
-        triangles=np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3),
         normals=normals.astype(np.float32),
         sides=np.repeat(sides, 3),
         longest=int(np.argmax(np.ptp(vertices, axis=0))),
