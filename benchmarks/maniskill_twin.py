@@ -202,7 +202,7 @@ class OpenTwinEnv(BaseEnv):
         return (q - asset.closed) / (asset.open - asset.closed)
 
     def _closing(self) -> Any:
-        return self._hand.pose.sp.to_transformation_matrix()[:3, 1]
+        return self._hand.pose.sp.to_transformation_matrix()[:3, 1].tolist()
 
     def evaluate(self) -> dict[str, Any]:
         """Success by our rule, and what reward and observation need of it."""

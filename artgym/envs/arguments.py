@@ -5,6 +5,7 @@ Each raises one error that names the argument, what came, and what would do.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, get_args
 
@@ -275,7 +276,10 @@ def read_action(action: Any, size: int) -> list[float]:
             f"action of shape {given.shape}: expected ({size},), one number in [-1, 1] for each "
             "entry of the action space"
         )
-    values: list[float] = given.astype(float).tolist()
-    if not all([-np.inf < value < np.inf for value in values]):
+    exact = given if given.dtype.char in "fd" else given.astype(float)
+    values: list[float] = exact.tolist()
+    if min(values) >= -1.0 and max(values) <= 1.0 and math.isfinite(sum(values)):
+        return values
+    if not all([math.isfinite(value) for value in values]):
         raise InvalidArgumentError(f"action={values}: expected finite numbers in [-1, 1]")
     return [min(1.0, max(-1.0, value)) for value in values]

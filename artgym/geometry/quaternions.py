@@ -38,6 +38,12 @@ def x_axis(q: Sequence[float]) -> Vector:
     return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
 
 
+def y_axis(q: Sequence[float]) -> Vector:
+    """Second column of the rotation matrix."""
+    w, x, y, z = q
+    return 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
+
+
 def z_axis(q: Sequence[float]) -> Vector:
     """Third column of the rotation matrix."""
     w, x, y, z = q

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 
-@dataclass(frozen=True)
-class PartContact:
+class PartContact(NamedTuple):
     """How the hand touches a part at one instant.
 
     Attributes:
@@ -27,7 +22,7 @@ def part_contact(
     contacts: Iterable[Any],
     part: object,
     hand_links: Mapping[Any, int],
-    closing: Callable[[], NDArray[np.floating]],
+    closing: Callable[[], Sequence[float]],
 ) -> PartContact:
     """How the hand touches a part, from the contacts of a simulator's step.
 
@@ -50,12 +45,15 @@ def part_contact(
             continue
         if link is None:
             continue
-        impulse = sum(point.impulse for point in contact.points)
-        if not np.any(impulse):
+        x = y = z = 0.0
+        for point in contact.points:
+            a, b, c = point.impulse.tolist()
+            x, y, z = x + a, y + b, z + c
+        if x == y == z == 0.0:
             continue
         touched = True
         if across is None:
             across = closing()
-        push[link] += sign * float(across @ impulse)
+        push[link] += sign * (across[0] * x + across[1] * y + across[2] * z)
     # The part presses the left finger outwards along +y and the right one along -y.
     return PartContact(touched=touched, pinched=push[1] > 0.0 > push[2])

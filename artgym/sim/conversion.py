@@ -30,6 +30,13 @@ def poses_from_transforms(Ts_a_b: Array) -> list[sapien.Pose]:
 
 def transform_from_pose(pose: sapien.Pose) -> Array:
     """``T_a_b`` (4, 4) in double precision from a simulator pose."""
-    x, y, z = pose.p.tolist()
-    a, b, c = quaternions.rows_from_quaternion(pose.q.tolist())
+    (x, y, z), quaternion = numbers_from_pose(pose)
+    a, b, c = quaternions.rows_from_quaternion(quaternion)
     return np.array(((*a, x), (*b, y), (*c, z), (0.0, 0.0, 0.0, 1.0)))
+
+
+def numbers_from_pose(pose: sapien.Pose) -> tuple[quaternions.Vector, quaternions.Quaternion]:
+    """Position and quaternion wxyz of a simulator pose."""
+    # What pickling keeps; the arrays p and q take four times as long.
+    state: tuple[float, ...] = pose.__getstate__()  # pyright: ignore[reportAssignmentType]
+    return state[:3], state[3:]  # pyright: ignore[reportReturnType]

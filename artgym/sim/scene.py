@@ -36,6 +36,7 @@ from artgym.objects.model import (
 from artgym.objects.textures import texture_pixels
 from artgym.sim.contact import PartContact, part_contact
 from artgym.sim.conversion import (
+    numbers_from_pose,
     pose_from_transform,
     transform_from_pose,
 )
@@ -97,14 +98,14 @@ class Reading(NamedTuple):
     """
 
     tcp_position: quaternions.Vector
-    hand_quaternion: list[float]
+    hand_quaternion: quaternions.Quaternion
     linear_velocity: list[float]
     angular_velocity: list[float]
     jaw_width: float
     q: list[float]
     velocities: list[float]
-    part_position: list[float]
-    part_quaternion: list[float]
+    part_position: quaternions.Vector
+    part_quaternion: quaternions.Quaternion
     arm_positions: list[float]
     arm_velocities: list[float]
 
@@ -119,12 +120,14 @@ class Reading(NamedTuple):
             *self.angular_velocity,
             *self.arm_velocities,
         )
-        # NaN is on neither side of anything.
+        places = (*self.tcp_position, *self.part_position)
         return (
-            all([-fastest < v < fastest for v in speeds])
-            and all([-farthest < v < farthest for v in self.tcp_position])
-            and all([-farthest < v < farthest for v in self.part_position])
-            and all([-math.inf < v < math.inf for v in self.q])
+            -fastest < min(speeds)
+            and max(speeds) < fastest
+            and -farthest < min(places)
+            and max(places) < farthest
+            # NaN hides from the least and the greatest, not from a sum.
+            and math.isfinite(sum(speeds) + sum(places) + sum(self.q))
         )
 
 
@@ -327,19 +330,18 @@ class ManipulationScene:
         """The hand and a part as they are now."""
         hand = self.hand
         assert hand is not None
-        pose = hand.pose_world()
-        quaternion = pose.q.tolist()
-        part_pose = self.body.links[part].entity_pose
+        position, quaternion = numbers_from_pose(hand.pose_world())
+        part_position, part_quaternion = numbers_from_pose(self.body.links[part].entity_pose)
         return Reading(
-            tcp_from_hand(pose.p.tolist(), quaternion),
+            tcp_from_hand(position, quaternion),
             quaternion,
             hand.linear_velocity(),
             hand.angular_velocity(),
             hand.width(),
             self.body.positions().tolist(),
             self.body.velocities().tolist(),
-            part_pose.p.tolist(),
-            part_pose.q.tolist(),
+            part_position,
+            part_quaternion,
             hand.arm_positions(),
             hand.arm_velocities(),
         )
@@ -360,9 +362,10 @@ class ManipulationScene:
             self._system.get_contacts(), self.body.links[part], self._hand_links, self._closing
         )
 
-    def _closing(self) -> Array:
+    def _closing(self) -> quaternions.Vector:
+        """The direction (3,) in the world along which the fingers close."""
         assert self.hand is not None
-        return transform_from_pose(self.hand.links[0].entity_pose)[:3, 1]
+        return quaternions.y_axis(numbers_from_pose(self.hand.pose_world())[1])
 
     def close(self) -> None:
         """Takes everything out of the scene; a shared renderer keeps nothing of it."""

@@ -11,8 +11,7 @@ Everything is arithmetic on scalars, numpy arrays or torch tensors alike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 #: Least travel of a success, as a share of the joint's range.
 TRAVEL_THRESHOLD = 0.5
@@ -24,8 +23,7 @@ REPORTED_TRAVELS = (0.10, 0.25, 0.50, 0.75, 0.90)
 _EPSILON = 1e-9
 
 
-@dataclass(frozen=True)
-class Progress:
+class Progress(NamedTuple):
     """How the target joint has moved since the start of an episode or a trial.
 
     Attributes:

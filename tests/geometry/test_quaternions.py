@@ -32,6 +32,7 @@ def test_product_axes_and_rotation(rng):
     product = matrix_from_quaternion(quaternions.product(a, b))
     np.testing.assert_allclose(product, R_a @ R_b, atol=1e-12)
     np.testing.assert_allclose(quaternions.x_axis(a), R_a[:, 0], atol=1e-12)
+    np.testing.assert_allclose(quaternions.y_axis(a), R_a[:, 1], atol=1e-12)
     np.testing.assert_allclose(quaternions.z_axis(a), R_a[:, 2], atol=1e-12)
     v = rng.normal(size=3)
     np.testing.assert_allclose(quaternions.rotate(a, v), R_a @ v, atol=1e-12)
