@@ -34,8 +34,9 @@ def arm_workplace(
 ) -> tuple[Array, Array]:
     """A place for an arm from which it can take a part where that is best taken and carry it.
 
-    Which grasp it will be is not known: some that come against the way the part will go, or
-    towards its axis, are tried, and the first for which there is a place counts.
+    Which grasp it will be is not known: some that come against the way the part opens, or towards
+    its axis, are tried, and the first for which there is a place counts. Those grasps close it too:
+    from the other side the body is in the way.
 
     Args:
         obj: the object.
@@ -60,7 +61,7 @@ def arm_workplace(
     motions = T_world_object @ motions @ transforms.invert(T_world_object)
     point = transforms.apply(T_world_part, obj.grip_point(part)[None])[0]
     axis = T_world_object[:3, :3] @ np.asarray(joint.axis)
-    way = direction * np.sign(joint.range) * axis
+    way = np.sign(joint.range) * axis
     towards = [-way]
     if joint.type == "revolute":
         arm = point - transforms.apply(T_world_object, np.asarray(joint.pivot)[None])[0]
