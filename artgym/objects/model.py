@@ -9,7 +9,7 @@ the canonical boxes of the paper (NPCS, NAOCS) are axis-aligned there.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from typing import Any, Literal, get_args
@@ -516,35 +516,36 @@ class ArticulatedObject:
 
     def content_hash(self) -> str:
         """SHA-256 of everything that describes the object; equal objects have equal hashes."""
-        digest = hashlib.sha256()
-        for token in _tokens(self):
-            digest.update(token.encode())
-            digest.update(b"\0")
-        return digest.hexdigest()
+        text = "".join([f"{token}\0" for token in _tokens(self, [])])
+        return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _tokens(value: object) -> Iterator[str]:
-    """A value as a flat, unambiguous sequence of texts."""
-    if isinstance(value, (TriangleMesh, Image)):
-        yield f"{type(value).__name__} {value.digest}"
+def _tokens(value: object, found: list[str]) -> list[str]:
+    """Adds a value to a flat, unambiguous sequence of texts."""
+    if isinstance(value, tuple):
+        found.append(f"tuple {len(value)}")
+        # Points: numpy's own repr names the type, and has changed before.
+        if all([type(item) is float for item in value]):
+            found.extend(map(float.__repr__, value))
+            return found
+        for item in value:
+            _tokens(item, found)
+    elif isinstance(value, float):
+        found.append(float.__repr__(value))
+    elif isinstance(value, (TriangleMesh, Image)):
+        found.append(f"{type(value).__name__} {value.digest}")
     elif is_dataclass(value):
-        yield type(value).__name__
+        found.append(type(value).__name__)
         for item in fields(value):
-            yield item.name
-            yield from _tokens(getattr(value, item.name))
+            found.append(item.name)
+            _tokens(getattr(value, item.name), found)
     elif isinstance(value, Mapping):
         for key in sorted(value):
-            yield str(key)
-            yield from _tokens(value[key])
-    elif isinstance(value, tuple):
-        yield f"tuple {len(value)}"
-        for item in value:
-            yield from _tokens(item)
-    elif isinstance(value, float):
-        # numpy's own repr names the type, and has changed before.
-        yield float.__repr__(value)
+            found.append(str(key))
+            _tokens(value[key], found)
     else:
-        yield repr(value)
+        found.append(repr(value))
+    return found
 
 
 def canonical_box(bounds: Array) -> tuple[Array, float]:
