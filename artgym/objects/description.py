@@ -41,6 +41,7 @@ from artgym.objects.model import (
     Material,
     Shape,
     Texture,
+    Vector,
 )
 
 #: Raised by one with each change that an older reader cannot read.
@@ -62,6 +63,8 @@ _LINE_LENGTH = 120
 
 #: How far a rotation may be from orthogonal and an axis from unit length.
 _UNIT_TOLERANCE = 1e-6
+#: A convex piece thinner than this share of its length has no hull that can be computed.
+_FLAT = 1e-9
 #: By how much, relatively, a moment of inertia may exceed the sum of the other two.
 _INERTIA_TOLERANCE = 1e-3
 
@@ -517,22 +520,29 @@ def _member(value: _Value, members: tuple[Any, ...]) -> Any:
 def _decoded_tuple(value: _Value, arguments: tuple[Any, ...], arrays: _ArraysFile) -> Any:
     if arguments[-1] is Ellipsis:
         most = {"links": MAX_LINKS, "joints": MAX_LINKS}.get(value.where.rpartition(".")[2])
-        entries = value.entries(most or max(MAX_SHAPES, MAX_VISUALS))
-        return tuple(_decoded(entry, arguments[0], arrays) for entry in entries)
-    plain = value.value
-    if (
-        len(set(arguments)) == 1
-        and arguments[0] is float
-        and isinstance(plain, list)
-        and len(plain) == len(arguments)
-        and all([type(n) is float and abs(n) <= MAX_MAGNITUDE for n in plain])
-    ):
-        # Most of a description: points. One by one they take ten times as long.
-        return tuple(plain)
+        most = most or max(MAX_SHAPES, MAX_VISUALS)
+        if arguments[0] == Vector and isinstance(value.value, list) and len(value.value) <= most:
+            points = [_plain_numbers(point, 3) for point in value.value]
+            if None not in points:
+                return tuple(points)
+        return tuple(_decoded(entry, arguments[0], arrays) for entry in value.entries(most))
+    if set(arguments) == {float} and (numbers := _plain_numbers(value.value, len(arguments))):
+        return numbers
     entries = value.entries(len(arguments))
     if len(entries) != len(arguments):
         raise value.error(f"expected {len(arguments)} entries")
     return tuple(_decoded(e, hint, arrays) for e, hint in zip(entries, arguments, strict=True))
+
+
+def _plain_numbers(value: object, count: int) -> tuple[float, ...] | None:
+    """So many numbers with nothing to complain of, or None: most of a description is points."""
+    if (
+        isinstance(value, list)
+        and len(value) == count
+        and all([type(n) is float and abs(n) <= MAX_MAGNITUDE for n in value])
+    ):
+        return tuple(value)
+    return None
 
 
 def _decoded_dataclass(value: _Value, kind: type, arrays: _ArraysFile) -> Any:
@@ -572,12 +582,15 @@ def _cylinder_complaints(cylinder: Cylinder) -> _Complaints:
 
 
 def _convex_complaints(convex: Convex) -> _Complaints:
-    # Raises where the points lie in one plane.
-    if not convex.volume > 0:
-        yield "points", "enclose no volume"
+    # Their hull would tell as well, and takes ten times as long.
+    spread = np.linalg.svd(convex.corners() - convex.corners().mean(axis=0), compute_uv=False)
+    if not spread[-1] > _FLAT * spread[0]:
+        yield "points", "lie in one plane, so that they enclose no volume"
 
 
 def _shape_complaints(shape: Shape) -> _Complaints:
+    if shape.rotation == Shape.rotation:
+        return
     R = np.asarray(shape.rotation, dtype=float)
     if not np.allclose(R @ R.T, np.eye(3), atol=_UNIT_TOLERANCE) or np.linalg.det(R) < 0:
         yield "rotation", "is no rotation matrix"
