@@ -29,7 +29,7 @@ class _Contents(abc.ABC):
                 digest.update(b"none")
             else:
                 digest.update(f"{array.dtype.str} {array.shape} ".encode())
-                digest.update(array.tobytes())
+                digest.update(array.data)
         return digest.hexdigest()
 
     def __eq__(self, other: object) -> bool:
