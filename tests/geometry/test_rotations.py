@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from artgym.geometry.rotations import (
     JAW_SYMMETRY,
     axis_angle_from_matrix,
+    cross,
     frame_from_z,
     geodesic_angle,
     grasp_angle,
@@ -124,3 +125,12 @@ def test_frame_from_z(batch):
 @pytest.mark.parametrize("z", np.concatenate([np.eye(3), -np.eye(3)]).tolist())
 def test_frame_along_the_axes(z):
     assert_rotation(frame_from_z(z))
+
+
+@pytest.mark.parametrize(
+    ("a", "b"), [((3,), (3,)), ((7, 3), (7, 3)), ((3,), (5, 3)), ((2, 1, 3), (4, 3))]
+)
+def test_cross_is_numpys_to_the_bit(a, b):
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(size=a), rng.normal(size=b)
+    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
