@@ -54,6 +54,8 @@ JSON_NAME, ARRAYS_NAME = "object.json", "arrays.npz"
 MAX_ARRAYS_BYTES = 256 * 2**20
 MAX_LINKS, MAX_SHAPES, MAX_VISUALS = 1000, 20_000, 20_000
 MAX_PICTURE_SIDE = 8192
+#: Arrays of more bytes in all are written compressed.
+_MAX_UNPACKED_BYTES = 32 * 2**20
 #: Metres, kilograms and the rest: larger numbers are a mistake.
 MAX_MAGNITUDE = 1e9
 _MAX_TEXT = 10_000
@@ -154,12 +156,18 @@ class _Arrays:
         return known.setdefault(value, len(known))
 
     def npz(self) -> bytes:
-        """A zip of .npy files without times in it."""
+        """A zip of .npy files without times in it.
+
+        Unpacked if that is no burden to a disk: a photograph takes longer to unpack than the rest
+        of the object to read.
+        """
+        total = sum(array.nbytes for _, array in self._named())
+        packing = zipfile.ZIP_STORED if total <= _MAX_UNPACKED_BYTES else zipfile.ZIP_DEFLATED
         buffer = io.BytesIO()
-        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as file:
+        with zipfile.ZipFile(buffer, "w") as file:
             for name, array in self._named():
                 info = zipfile.ZipInfo(f"{name}.npy")
-                info.compress_type = zipfile.ZIP_DEFLATED
+                info.compress_type = packing
                 file.writestr(info, _npy_header(array.dtype.str, array.shape) + array.tobytes())
         return buffer.getvalue()
 

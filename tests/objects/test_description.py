@@ -77,6 +77,16 @@ def test_equal_objects_give_equal_bytes(pictured: ArticulatedObject, tmp_path: P
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
 
+def test_large_arrays_are_written_compressed(
+    pictured: ArticulatedObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = write_description(pictured, tmp_path / "small") / "arrays.npz"
+    monkeypatch.setattr(description, "_MAX_UNPACKED_BYTES", 1000)
+    large = write_description(pictured, tmp_path / "large")
+    assert (large / "arrays.npz").stat().st_size < small.stat().st_size
+    assert read_description(large) == read_description(small.parent) == pictured
+
+
 def test_a_number_of_numpy_comes_back_equal(tmp_path: Path) -> None:
     laptop = catalog.load("laptop/0003")
     link = replace(laptop.links[1], density=np.float64(100.1))
