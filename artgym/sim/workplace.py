@@ -17,7 +17,7 @@ Array = NDArray[np.floating]
 #: Share of its range through which the arm shall be able to carry a part.
 _CARRIED = 0.7
 #: How far before the part, along its approach, the hand starts, metres; and how far beside.
-_STANDOFF, _SPREAD = (0.16, 0.24), 0.04
+_STANDOFF, _SPREAD = (0.18, 0.26), 0.04
 #: Turns of the hand about its approach that are tried, radians.
 _ROLLS = (0.0, np.pi / 2, np.pi / 4, -np.pi / 4)
 
