@@ -238,6 +238,7 @@ def annotate(
     count: int = 40,
     out: Path | None = None,
     workers: int = 1,
+    backend: Literal["loky", "dask", "ray"] = "loky",
 ) -> int:
     """Label which grasps succeed, by trying them. Interrupted, the same command goes on.
 
@@ -249,6 +250,7 @@ def annotate(
         out: folder that gets {category}/{split}; by default the labels inside the package. With
             --object it must be given.
         workers: processes; any number gives the same bytes.
+        backend: loky for processes of this machine, or a cluster's dask or ray.
     """
     from artgym.annotation import annotate as labels
     from artgym.files import write_arrays
@@ -266,48 +268,82 @@ def annotate(
         print(path)
         return 0
     assert category is not None
-    manifest = labels.annotate_split(category, split, count, root=out, workers=workers)  # type: ignore[arg-type]
+    manifest = labels.annotate_split(
+        category,
+        split,  # type: ignore[arg-type]
+        count,
+        root=out,
+        workers=workers,
+        backend=backend,
+    )
     print(f"{len(manifest.shards)} label files in {labels.labels_folder(category, split, out)}")
     return 0
 
 
 def generate(
+    set: tyro.conf.Positional[Literal["artimage", "reartmix"]],
     *,
-    category: str,
     out: Path,
-    split: str = "train",
+    category: tuple[str, ...] = (),
+    split: tuple[str, ...] = ("train", "val", "test"),
     labels: Path | None = None,
-    views: int = 16,
-    camera_size: tuple[int, int] = (320, 240),
+    views: int = 8,
+    scenes: tuple[int, int, int] = (640, 64, 96),
+    camera_size: tuple[int, int] = (640, 480),
+    depth_noise: bool = False,
     seed: int = 0,
     workers: int = 1,
+    backend: Literal["loky", "dask", "ray"] = "loky",
 ) -> int:
-    """Make labelled RGB-D samples. Interrupted, the same command goes on where it stopped.
+    """Make labelled RGB-D pictures. Interrupted, the same command goes on where it stopped.
 
     Args:
-        category: the category to picture.
-        out: folder that gets {category}/{split}, as `icaf4 train` wants it.
-        split: train, val or test.
+        set: artimage shows one object a picture, reartmix several on one table.
+        out: folder that gets {category}/{split} of artimage, as `icaf4 train` wants it, or {split}
+            of reartmix.
+        category: categories; by default those of the paper's set.
+        split: train, val, test; objects are in one of them.
         labels: folder that `artgym annotate` wrote; by default the labels inside the package.
-        views: pictures of each labelled joint state.
+        views: of artimage, pictures of each labelled joint state.
+        scenes: of reartmix, pictures of the train, val and test split.
         camera_size: width and height, pixels.
+        depth_noise: give depth the errors of a real sensor.
         seed: of views, lights and placements.
         workers: processes; any number gives the same bytes.
+        backend: loky for processes of this machine, or a cluster's dask or ray.
     """
-    from artgym.datasets.generate import GenerationConfig, generate_split
+    from artgym.datasets import generate as pictures
 
-    # A wrong name shall be called that, and not a lack of labels.
-    _catalogue_ids(category, split, None)
-    folder = out / category / split
-    manifest = generate_split(
-        category,
-        split,  # type: ignore[arg-type]
-        folder,
-        config=GenerationConfig(views=views, camera_size=camera_size, seed=seed),
-        label_root=labels,
-        workers=workers,
+    chosen = category or pictures.SETS[set]
+    for name in chosen:
+        for each in split:
+            # A wrong name shall be called that, and not a lack of labels.
+            _catalogue_ids(name, each, None)
+    config = pictures.GenerationConfig(
+        views=views, camera_size=camera_size, depth_noise=depth_noise, seed=seed
     )
-    print(f"{manifest.num_items} samples in {folder}")
+    counts: dict[str, int] = dict(zip(("train", "val", "test"), scenes, strict=True))
+    options: dict[str, Any] = {
+        "config": config,
+        "label_root": labels,
+        "workers": workers,
+        "backend": backend,
+    }
+    for each in split:
+        if set == "reartmix":
+            manifest = pictures.generate_reartmix(
+                each,  # type: ignore[arg-type]
+                out / each,
+                counts[each],
+                categories=chosen,
+                **options,
+            )
+            print(f"{manifest.num_items} pictures in {out / each}")
+            continue
+        for name in chosen:
+            folder = out / name / each
+            manifest = pictures.generate_artimage(name, each, folder, **options)  # type: ignore[arg-type]
+            print(f"{manifest.num_items} pictures in {folder}")
     return 0
 
 
@@ -334,6 +370,47 @@ def export(
     return 0
 
 
+def show(
+    what: tyro.conf.Positional[Literal["object", "labels", "sample"]],
+    source: tyro.conf.Positional[str],
+    *,
+    out: Path,
+    labels: Path | None = None,
+    state: int | None = None,
+    index: int | None = None,
+) -> int:
+    """Look at something: a PNG sheet, and a 3D page for any browser, in one HTML file each.
+
+    Args:
+        what: an object, the grasp labels of an object, or a picture of a set.
+        source: the object's id, such as drawer/0012 or import/NAME; of a picture the folder that
+            `artgym generate` wrote.
+        out: folder for both files.
+        labels: of labels, the folder that `artgym annotate` wrote; by default the labels inside
+            the package.
+        state: of labels, the joint state to show; by default all of them.
+        index: of a picture, its place in the set; by default 0.
+    """
+    from artgym.show.label_view import show_labels
+    from artgym.show.object_view import show_object
+    from artgym.show.sample_view import show_sample
+
+    options = {"labels": labels, "state": state, "index": index}
+    known = {"object": (), "labels": ("labels", "state"), "sample": ("index",)}[what]
+    for name, value in options.items():
+        if value is not None and name not in known:
+            raise InvalidArgumentError(f"--{name} {value} does not go with `artgym show {what}`.")
+    if what == "object":
+        written = show_object(source, out)
+    elif what == "labels":
+        written = show_labels(source, out, root=labels, state=state)
+    else:
+        written = show_sample(Path(source), out, index=index or 0)
+    for path in written:
+        print(path)
+    return 0
+
+
 def _catalogue_ids(category: str | None, split: str, count: int | None) -> list[str]:
     from artgym.objects import catalog, store
 
@@ -351,6 +428,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "annotate": annotate,
     "generate": generate,
     "export": export,
+    "show": show,
 }
 
 

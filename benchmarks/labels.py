@@ -16,17 +16,11 @@ from numpy.typing import NDArray
 from rich.table import Table
 from tqdm import tqdm
 
-from artgym.annotation.annotate import (
-    MOVABLE_PART,
-    TRIAL_ENDS,
-    Labels,
-    labelled_categories,
-    labelled_ids,
-    read_labels,
-)
+from artgym.annotation.annotate import Labels, labelled_categories, labelled_ids, read_labels
 from artgym.annotation.filter import Verdict
+from artgym.annotation.trial import TRIAL_ENDS
 from artgym.errors import InvalidArgumentError
-from artgym.geometry.grasps import APPROACH_RINGS, NUM_CANDIDATES, NUM_ROLLS, candidates_of_part
+from artgym.geometry.grasps import APPROACH_RINGS, NUM_ROLLS
 from artgym.objects import catalog
 from benchmarks import record
 from benchmarks.command import run
@@ -92,7 +86,7 @@ def statistics(labels: Sequence[Labels], seed: int) -> dict[str, Any]:
         labels: of at least one object.
         seed: of the chance rows.
     """
-    success = np.concatenate([one.success.reshape(-1, NUM_CANDIDATES) for one in labels])
+    success = np.concatenate([one.success for one in labels])
     graspable = np.any(success, axis=1)
     verdicts = np.sum([one.verdicts.sum(axis=0) for one in labels], axis=0)
     ends = np.sum([one.ends.sum(axis=0) for one in labels], axis=0)
@@ -102,6 +96,7 @@ def statistics(labels: Sequence[Labels], seed: int) -> dict[str, Any]:
         "states": sum(len(one.fractions) for one in labels),
         "points": len(success),
         "tries": success.size,
+        "trials": int(ends.sum()),
         "verdicts": {
             verdict.name.lower().replace("_", " "): int(verdicts[verdict]) for verdict in Verdict
         },
@@ -143,22 +138,14 @@ def _chance(labels: Sequence[Labels], rng: np.random.Generator) -> dict[str, dic
     angles: dict[str, list[float]] = {name: [] for name in CHANCE_ROWS}
     for one in labels:
         obj = catalog.load(one.object_id)
-        for state, fraction in enumerate(one.fractions):
-            q = obj.positions_with(MOVABLE_PART, float(fraction))
-            R_object_part = obj.link_poses(q)[MOVABLE_PART][:3, :3]
-            tries = one.success[state]
-            graspable = np.flatnonzero(tries.any(axis=1))
-            if not len(graspable):
-                continue
-            R_tries = candidates_of_part(one.normals_part[state][graspable], R_object_part)
+        tries = one.success
+        for row in np.flatnonzero(tries.any(axis=1)):
+            R_tries = one.tries(obj, int(row))[1][:, :3, :3]
             # The first try of all goes straight against the surface.
-            normals = -R_tries[:, 0, :, 2]
-            drawn = {name: draw(normals, _DRAWS, rng) for name, draw in CHANCE_ROWS.items()}
-            for row, point in enumerate(graspable):
-                R_successes = R_tries[row, tries[point]]
-                for name, R_drawn in drawn.items():
-                    nearest = grasp_distances(R_drawn[row], R_successes).min(axis=1)
-                    angles[name].append(float(np.degrees(nearest).mean()))
+            normal = -R_tries[None, 0, :, 2]
+            for name, draw in CHANCE_ROWS.items():
+                nearest = grasp_distances(draw(normal, _DRAWS, rng)[0], R_tries[tries[row]])
+                angles[name].append(float(np.degrees(nearest.min(axis=1)).mean()))
     return {
         name: {"mean": _mean(values), "median_of_points": _median(values)}
         for name, values in angles.items()
@@ -182,7 +169,7 @@ def statistics_table(labels: dict[str, dict[str, Any]]) -> Table:
     table.add_column("")
     for category, split, _ in columns:
         table.add_column(f"{category}/{split}", justify="right")
-    for name in ("objects", "objects_without_success", "points", "tries", "successes"):
+    for name in ("objects", "objects_without_success", "points", "tries", "trials", "successes"):
         table.add_row(name.replace("_", " "), *(f"{n[name]:,}" for _, _, n in columns))
     for verdict in columns[0][2]["verdicts"]:
         shares = (100 * n["verdicts"][verdict] / n["tries"] for _, _, n in columns)

@@ -21,6 +21,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = (
     ROOT / "README.md",
     ROOT / "docs" / "environments.md",
+    ROOT / "docs" / "labels.md",
     ROOT / "docs" / "objects.md",
     ROOT / "icaf4_policy" / "weights" / "README.md",
 )
@@ -174,8 +175,8 @@ def solvability_block(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def speed_block(result: Mapping[str, Any]) -> str:
-    """A Markdown table of ``speed.json``, a comparison a line."""
+def env_speed_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``env_speed.json``, a comparison a line."""
     categories = list(result["rows"])
     head = "".join(f" {c}: ours | other | ratio |" for c in categories)
     lines = [f"| ours / other |{head} aim |", "|---|" + "---|" * (3 * len(categories) + 1)]
@@ -198,6 +199,78 @@ def speed_block(result: Mapping[str, Any]) -> str:
         f"{result['rows'][categories[0]]['renderer'].upper()}.",
     ]
     return "\n".join(lines)
+
+
+def labels_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``labels.json``, a category a line, and success by approach."""
+    tilts = [ring["tilt_deg"] for ring in next(iter(result["labels"].values()))["train"]["rings"]]
+    lines = [
+        "| category | objects | without success | points | tries | in physics | succeed "
+        "| points with success | at these, of the tries |"
+        + "".join(f" tilt {tilt:.0f} deg |" for tilt in tilts),
+        "|---|" + "---|" * (8 + len(tilts)),
+    ]
+    total: dict[str, int] = dict.fromkeys(("objects", "points", "tries", "trials", "successes"), 0)
+    for category, splits in result["labels"].items():
+        rows = list(splits.values())
+        summed = {name: sum(row[name] for row in rows) for name in total}
+        total = {name: total[name] + summed[name] for name in total}
+        none = sum(row["objects_without_success"] for row in rows)
+        cells = [f"{summed['objects']}", f"{none}"]
+        cells += [f"{summed[name]:,}" for name in ("points", "tries", "trials", "successes")]
+
+        def mean(value: Callable[[Any], float], rows: list[Any] = rows) -> str:
+            weights = [row["points"] for row in rows]
+            weighted = sum(w * value(row) for w, row in zip(weights, rows, strict=True))
+            return f"{100 * weighted / sum(weights):.1f} %"
+
+        cells.append(mean(lambda row: row["graspable_points"]))
+        cells.append(mean(lambda row: row["density_at_graspable_points"]))
+        for i in range(len(tilts)):
+            cells.append(mean(lambda row, i=i: row["rings"][i]["density"]))
+        lines.append(f"| {category} | " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        f"{total['objects']} objects; {total['tries']:,} tries at {total['points']:,} points, of "
+        f"which {total['trials']:,} were decided by physics and the others by the filter; "
+        f"{total['successes']:,} succeed. Tilt is the angle of the approach from the inward "
+        "normal; below it the share of such tries that succeed.",
+    ]
+    return "\n".join(lines)
+
+
+def label_speed_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``label_speed.json``, a category a line."""
+    agreement, rejects = result["agreement"], result["rejects"]
+    lines = [
+        "| category | verdicts a second, one core | decided by the filter | trials stopped early "
+        "| compared with the reference | agreement | kappa |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    rows = [(c, row, agreement["categories"][c]) for c, row in result["categories"].items()]
+    for category, row, agreed in [*rows, ("all", result["all"], agreement["all"])]:
+        ends = row["ends"]
+        early = sum(ends[end] for end in ("blocked", "empty", "lost")) / max(1, sum(ends.values()))
+        lines.append(
+            f"| {category} | {row['verdicts_a_second_one_core']:,.0f} "
+            f"| {100 * row['decided_by_filter']:.1f} % | {100 * early:.0f} % "
+            f"| {agreed['compared']:,} | {100 * agreed['agreement']:.2f} % "
+            f"| {_known(agreed['kappa'])} |"
+        )
+    workers = result["config"]["workers"]
+    lines += [
+        "",
+        f"{result['verdicts_a_second']:,.0f} verdicts a second with {workers} processes, "
+        f"{result['verdicts_a_second_one_core']:,.0f} with one; "
+        f"{result['times_where2act']:,.0f} times Where2Act's protocol re-created "
+        "(`benchmarks/where2act_protocol.py`), its pictures left out. Of "
+        f"{rejects['tried']:,} poses that the filter rejects physics accepts {rejects['wrong']}.",
+    ]
+    return "\n".join(lines)
+
+
+def _known(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
 
 
 def rays_block(result: Mapping[str, Any]) -> str:
@@ -240,10 +313,16 @@ BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "objects": objects_block,
     "variety": variety_block,
     "solvability": solvability_block,
-    "speed": speed_block,
+    "env_speed": env_speed_block,
+    "labels": labels_block,
+    "label_speed": label_speed_block,
     "rays": rays_block,
     "rl_baselines": rl_baselines_block,
 }
+
+
+#: What makes a result whose module has several.
+_COMMANDS = {"env_speed": "speed env", "label_speed": "speed labels"}
 
 
 def filled(page: str, results: Path = RESULTS_FOLDER) -> str:
@@ -265,7 +344,7 @@ def filled(page: str, results: Path = RESULTS_FOLDER) -> str:
         except (OSError, ValueError, KeyError) as error:
             raise DamagedFileError(
                 f"{file} cannot be quoted ({type(error).__name__}: {error}); make it again with "
-                f"`python -m benchmarks.{name}`"
+                f"`python -m benchmarks.{_COMMANDS.get(name, name)}`"
             ) from error
         before, _, rest = page.partition(start)
         _, _, after = rest.partition(end)

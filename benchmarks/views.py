@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from artgym.datasets.generate import GenerationConfig, make_samples
+from artgym.datasets.generate import GenerationConfig, make_pictures
 from benchmarks.policies import load_perception
 
 
@@ -40,7 +40,8 @@ def score_views(task: ViewsTask) -> list[dict[str, float]]:
     perception = load_perception(task.category, task.weights)
     config = GenerationConfig(views=task.views, seed=task.seed)
     rows = []
-    for number, sample in enumerate(make_samples(task.object_id, config, task.label_root)):
+    pictures = make_pictures(task.object_id, config, task.label_root)
+    for number, sample in enumerate(s for picture in pictures for s in picture.samples):
         rng = np.random.default_rng([task.seed, zlib.crc32(task.object_id.encode()), number])
         row = evaluate_sample(perception, sample, rng)
         for name in ("part_translation", "object_translation", "joint_pivot"):

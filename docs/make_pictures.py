@@ -1,10 +1,14 @@
-"""Makes the picture of what the network sees: `python docs/make_pictures.py`.
+"""Makes the pictures of what the network sees and of what `artgym show` gives.
 
-Needs a renderer. Objects are test objects; the same command gives the same picture.
+Needs a renderer: `python docs/make_pictures.py`, or with names of pictures to make only those.
+Objects are test objects; the same command gives the same pictures.
 """
 
 from __future__ import annotations
 
+import sys
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import gymnasium
@@ -13,6 +17,10 @@ import numpy as np
 
 import artgym  # noqa: F401  (registers the environments)
 from artgym.datasets.frame import CameraFrame
+from artgym.datasets.generate import generate_reartmix
+from artgym.show.label_view import show_labels
+from artgym.show.object_view import show_object
+from artgym.show.sample_view import show_sample
 from benchmarks.policies import trained_categories
 from icaf4_policy.drawing import draw_prediction
 from icaf4_policy.inference import Perception
@@ -40,12 +48,40 @@ def perceived(category: str, seed: int = 0) -> np.ndarray:
     return np.concatenate([frame.rgb, panels], axis=1)
 
 
-def main() -> None:
-    """Writes the picture."""
-    PICTURES.mkdir(exist_ok=True)
+def perceived_png() -> bytes:
+    """Looks at all categories that have a network."""
     looks = np.concatenate([perceived(name) for name in trained_categories()])
-    imageio.imwrite(PICTURES / "perceived.png", looks)
-    print(f"wrote perceived.png to {PICTURES}")
+    return imageio.imwrite("<bytes>", looks, extension=".png")
+
+
+def sheet(show: Callable[[Path], tuple[Path, Path]]) -> bytes:
+    """The sheet that one of the functions behind `artgym show` writes to a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        png, _ = show(Path(folder))
+        return png.read_bytes()
+
+
+def shown_sample(folder: Path) -> tuple[Path, Path]:
+    """Makes a scene from the labels inside the package and shows it."""
+    scenes = folder / "scenes"
+    generate_reartmix("test", scenes, 1, categories=("laptop", "drawer"), progress=False)
+    return show_sample(scenes, folder)
+
+
+MADE: dict[str, Callable[[], bytes]] = {
+    "perceived": perceived_png,
+    "shown_object": lambda: sheet(lambda out: show_object("laptop/1201", out)),
+    "shown_labels": lambda: sheet(lambda out: show_labels("laptop/1201", out)),
+    "shown_sample": lambda: sheet(shown_sample),
+}
+
+
+def main() -> None:
+    """Writes the pictures."""
+    PICTURES.mkdir(exist_ok=True)
+    for name in sys.argv[1:] or MADE:
+        (PICTURES / f"{name}.png").write_bytes(MADE[name]())
+        print(f"wrote {name}.png to {PICTURES}")
 
 
 if __name__ == "__main__":

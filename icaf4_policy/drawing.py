@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 
+from artgym.datasets.drawing import PART_COLORS, draw_line, hand_lines
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.geometry.camera import project
-from artgym.geometry.grasps import GRASP_DEPTH
+from artgym.geometry.transforms import transform_from
 from icaf4_policy.inference import Prediction
 
-#: Colours of the parts, RGB; they repeat beyond the last.
-_PART_COLORS = ((90, 130, 200), (240, 160, 60), (110, 190, 110), (200, 90, 160), (150, 120, 90))
 _AXIS_COLOR, _BEST_COLOR, _GRASP_COLOR = (255, 255, 0), (0, 255, 0), (0, 170, 220)
-#: Half the opening of the drawn jaws, the length of the drawn stem and axis, metres.
-_JAW_HALF_WIDTH, _STEM, _AXIS_HALF_LENGTH = 0.03, 0.06, 0.1
+#: Half the length of a drawn axis, metres.
+_AXIS_HALF_LENGTH = 0.1
 
 
 def _read(path: Path) -> Image.Image:
@@ -98,32 +97,15 @@ def draw_prediction(
         corners.tolist(), prediction.part, prediction.affordance, strict=True
     ):
         dot = (u - width, v - width, u + width, v + width)
-        parts.ellipse(dot, fill=_PART_COLORS[part % len(_PART_COLORS)])
+        parts.ellipse(dot, fill=PART_COLORS[part % len(PART_COLORS)])
         affordance.ellipse(dot, fill=(int(255 * value), 60, int(255 * (1 - value))))
     for joint in prediction.joints:
         if np.any(joint.axis_camera):
             reach = np.array([[-_AXIS_HALF_LENGTH], [_AXIS_HALF_LENGTH]]) * joint.axis_camera
-            _draw_line(grasps, joint.pivot_camera + reach, intrinsics, _AXIS_COLOR, width)
+            draw_line(grasps, joint.pivot_camera + reach, intrinsics, _AXIS_COLOR, width)
     proposals = prediction.grasps
     for i in reversed(range(min(num_grasps, len(proposals.scores)))):
-        R, point = proposals.R_camera_grasp[i], proposals.points_camera[i]
-        closing, approach = R[:, 1] * _JAW_HALF_WIDTH, R[:, 2]
-        palm, tip = point - approach * GRASP_DEPTH, point + approach * GRASP_DEPTH
-        color = _GRASP_COLOR if i else _BEST_COLOR
-        jaws = np.stack([tip - closing, palm - closing, palm + closing, tip + closing])
-        _draw_line(grasps, jaws, intrinsics, color, width)
-        _draw_line(grasps, np.stack([palm, palm - approach * _STEM]), intrinsics, color, width)
+        T_camera_grasp = transform_from(proposals.R_camera_grasp[i], proposals.points_camera[i])
+        for line in hand_lines(T_camera_grasp):
+            draw_line(grasps, line, intrinsics, _GRASP_COLOR if i else _BEST_COLOR, width)
     return np.concatenate([np.asarray(panel) for panel in panels], axis=1)
-
-
-def _draw_line(
-    panel: ImageDraw.ImageDraw,
-    points_camera: NDArray[np.floating],
-    intrinsics: ArrayLike,
-    color: tuple[int, int, int],
-    width: int,
-) -> None:
-    """Draws a line through points (n, 3); none that reaches behind the camera."""
-    if points_camera[:, 2].min() > 0.01:
-        corners = project(points_camera, intrinsics)
-        panel.line([(u, v) for u, v in corners.tolist()], fill=color, width=width)

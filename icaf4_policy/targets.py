@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -173,9 +174,12 @@ def _jittered(
     return np.clip(shifted + gray_share * (gray - shifted), 0.0, 1.0).astype(np.float32)
 
 
-def _draw_one(
-    targets: Targets, config: DrawConfig, rng: np.random.Generator
-) -> dict[str, NDArray[Any]]:
+#: What is drawn of one sample: the fields of ``Batch`` without B and ``anchor_mask``.
+Item = dict[str, NDArray[Any]]
+
+
+def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) -> Item:
+    """A fresh choice of a sample's points, with all their targets."""
     pick = choose_points(len(targets.points_level), config.num_points, rng)
     points, part = targets.points_level[pick], targets.part[pick]
     colors = targets.colors[pick].astype(np.float32) / 255.0
@@ -223,17 +227,18 @@ def _draw_one(
     }
 
 
-def draw_batch(
-    targets: list[Targets], config: DrawConfig, rngs: list[np.random.Generator]
-) -> Batch:
-    """A batch with a fresh choice of points, one generator a cloud."""
-    rows = [_draw_one(t, config, rng) for t, rng in zip(targets, rngs, strict=True)]
+def collate_items(items: Sequence[Item], config: DrawConfig) -> Batch:
+    """A batch of drawn items."""
     cells = config.num_grasp_points * config.num_anchors
-    index = np.concatenate([r.pop("match_index") + b * cells for b, r in enumerate(rows)])
-    residual = np.concatenate([r.pop("match_residual") for r in rows])
-    mask = np.zeros((len(rows), config.num_grasp_points, config.num_anchors), np.float32)
+    index = np.concatenate([item["match_index"] + b * cells for b, item in enumerate(items)])
+    residual = np.concatenate([item["match_residual"] for item in items])
+    mask = np.zeros((len(items), config.num_grasp_points, config.num_anchors), np.float32)
     mask.reshape(-1)[index] = 1.0
-    stacked = {name: torch.from_numpy(np.stack([r[name] for r in rows])) for name in rows[0]}
+    stacked = {
+        name: torch.from_numpy(np.stack([item[name] for item in items]))
+        for name in items[0]
+        if name not in ("match_index", "match_residual")
+    }
     return Batch(
         **stacked,
         anchor_mask=torch.from_numpy(mask),

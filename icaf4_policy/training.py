@@ -21,12 +21,17 @@ from artgym.datasets.sample import Sample
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from icaf4_policy.anchors import axis_anchors
 from icaf4_policy.checkpoint import load_tensors, save_model, save_tensors
+from icaf4_policy.dataset import SPARE_POINTS
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig
-from icaf4_policy.targets import Batch, DrawConfig, Targets, draw_batch, targets_from_sample
-
-#: Of a sample's points, at most this many times ``num_points`` are kept to draw from.
-_SPARE_POINTS = 3
+from icaf4_policy.targets import (
+    Batch,
+    DrawConfig,
+    Targets,
+    collate_items,
+    draw_item,
+    targets_from_sample,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +139,7 @@ def prepare(
         digest.update(sample.object_id.encode())
         digest.update(np.ascontiguousarray(sample.points_camera).tobytes())
         digest.update(np.ascontiguousarray(sample.grasp_bits).tobytes())
-        prepared.append(targets_from_sample(sample, anchors, _SPARE_POINTS * config.num_points))
+        prepared.append(targets_from_sample(sample, anchors, SPARE_POINTS * config.num_points))
     return prepared, digest.hexdigest()
 
 
@@ -179,8 +184,10 @@ def _batches(
         stop = max(len(order) // batch_size * batch_size, min(len(order), batch_size))
     for first in range(0, stop, batch_size):
         index = order[first : first + batch_size]
-        rngs = [np.random.default_rng((*stream, int(i))) for i in index]
-        yield draw_batch([targets[i] for i in index], draw, rngs)
+        items = [
+            draw_item(targets[i], draw, np.random.default_rng((*stream, int(i)))) for i in index
+        ]
+        yield collate_items(items, draw)
 
 
 @torch.no_grad()

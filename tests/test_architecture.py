@@ -43,7 +43,8 @@ ALLOWED_IMPORTS = {
 }
 # Who may import the simulator, by prefix of the module's name.
 SIMULATOR_USERS = {
-    "sapien": ("artgym.sim", "artgym.maniskill"),
+    # The protocol is another project's, in a process of its own.
+    "sapien": ("artgym.sim", "artgym.maniskill", "benchmarks.where2act_protocol"),
     "mani_skill": ("artgym.maniskill", "benchmarks.maniskill_twin"),
 }
 # The plain-numpy packages import nothing that is heavy or draws.

@@ -1,4 +1,4 @@
-"""Labels of an object: which of ~200 grasps succeed at surface points, in several joint states.
+"""Labels of an object: which of 200 grasps succeed at surface points, in several joint states.
 
 A label set is one file an object; it holds one bit a try, since the poses tried are a function of
 the point's normal (``geometry.grasps``).
@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artgym.annotation.filter import FilterConfig, Verdict, judge
-from artgym.annotation.trial import TrialConfig, try_grasp
-from artgym.errors import InvalidArgumentError
+from artgym.annotation.trial import TRIAL_ENDS, TrialConfig, try_grasp
+from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import Manifest, read_arrays, write_arrays
 from artgym.geometry import transforms
-from artgym.geometry.grasps import NUM_CANDIDATES, candidate_rotations
+from artgym.geometry.grasps import NUM_CANDIDATES, candidates_of_part
 from artgym.jobs import ShardTask, run_shards
 from artgym.objects import catalog
 from artgym.objects.meshes import link_triangles
@@ -31,9 +31,6 @@ from artgym.sim.setting import MAX_YAW
 
 Array = NDArray[np.floating]
 
-#: The part whose grasps are labelled and that moves in the tasks of one-jointed objects.
-MOVABLE_PART = 1
-
 _SHIPPED_LABELS = Path(__file__).parent / "labels"
 
 
@@ -42,10 +39,12 @@ class AnnotationConfig:
     """What is tried at an object.
 
     Attributes:
-        start_states: joint states drawn from the category's start interval.
-        later_states: joint states drawn from beyond it, up to ``latest``.
-        latest: largest open fraction of a later state.
-        points: surface points a state.
+        start_states: joint states as an opening episode begins: every part's open fraction is
+            drawn from the category's start interval.
+        open_states: joint states in which every part's open fraction is drawn from all of [0, 1].
+        least_points: surface points a state, taken from the movable parts in turn.
+        most_points: of each part.
+        trials: once so many grasps of a state were tried in physics, no further point is begun.
         views: cameras from which the points are seen; what no camera sees is not labelled.
         yaw: largest turn of the object against the cameras, radians.
         filter: geometric filter.
@@ -54,37 +53,37 @@ class AnnotationConfig:
     """
 
     start_states: int = 2
-    later_states: int = 1
-    latest: float = 0.3
-    points: int = 48
+    open_states: int = 2
+    least_points: int = 6
+    most_points: int = 32
+    trials: int = 400
     views: int = 8
     yaw: float = MAX_YAW
     filter: FilterConfig = field(default_factory=FilterConfig)
     trial: TrialConfig = field(default_factory=TrialConfig)
     seed: int = 0
 
-    @property
-    def states(self) -> int:
-        """Joint states an object."""
-        return self.start_states + self.later_states
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Labels:
-    """What was found at an object: S joint states, G points each, C tries a point.
+    """What was found at an object: S joint states, N points in all, C tries a point.
 
     Attributes:
         object_id: catalogue id.
-        fractions: (S,) open fraction of the movable part.
-        points_part: (S, G, 3) surface points in the part's frame, metres.
-        normals_part: (S, G, 3) outward unit normals, same frame.
-        bits: (S, G, C / 8) uint8, success of each try, little bit order.
+        fractions: (S, K - 1) open fraction of each movable part.
+        state: (N,) the joint state that a point was tried in, ascending.
+        part: (N,) index of the part that a point lies on and that was moved.
+        points_part: (N, 3) surface points in their part's frame, metres.
+        normals_part: (N, 3) outward unit normals, same frame.
+        bits: (N, C / 8) uint8, success of each try, little bit order.
         verdicts: (S, 3) how many tries the filter called possible, empty and in collision.
-        ends: (S, 4) how many trials ended ``TRIAL_ENDS``.
+        ends: (S, 5) how many trials ended ``TRIAL_ENDS``.
     """
 
     object_id: str
     fractions: Array
+    state: NDArray[np.uint8]
+    part: NDArray[np.uint8]
     points_part: Array
     normals_part: Array
     bits: NDArray[np.uint8]
@@ -93,58 +92,126 @@ class Labels:
 
     @property
     def success(self) -> NDArray[np.bool_]:
-        """(S, G, C): whether each try succeeded."""
+        """(N, C): whether each try succeeded."""
         return np.unpackbits(self.bits, axis=-1, count=NUM_CANDIDATES, bitorder="little").astype(
             bool
         )
 
+    def tries(self, obj: ArticulatedObject, row: int) -> tuple[Array, Array]:
+        """Joint positions (K - 1,) and the poses (C, 4, 4) tried at a point, object frame.
 
-TRIAL_ENDS = ("moved", "not moved", "blocked", "empty")
+        Just those that were tried, to the last bit.
+        """
+        q = positions_at(obj, self.fractions[self.state[row]])
+        return q, tried_poses(
+            obj, q, int(self.part[row]), self.points_part[row], self.normals_part[row]
+        )
 
-_ARRAYS = ("fractions", "points_part", "normals_part", "bits", "verdicts", "ends")
+
+_ARRAYS = (
+    "fractions",
+    "state",
+    "part",
+    "points_part",
+    "normals_part",
+    "bits",
+    "verdicts",
+    "ends",
+)
+
+
+def positions_at(obj: ArticulatedObject, fractions: Array) -> Array:
+    """Joint positions (K - 1,) at the parts' open fractions (K - 1,)."""
+    return np.array(
+        [joint.position(float(f)) for joint, f in zip(obj.joints, fractions, strict=True)]
+    )
+
+
+def tried_poses(
+    obj: ArticulatedObject, q: Array, part: int, point_part: Array, normal_part: Array
+) -> Array:
+    """``T_object_grasp`` (C, 4, 4) of the tries at a point (3,) of a part with a normal (3,)."""
+    T_object_part = obj.link_poses(q)[part]
+    poses = np.tile(np.eye(4), (NUM_CANDIDATES, 1, 1))
+    poses[:, :3, :3] = candidates_of_part(normal_part, T_object_part[:3, :3])
+    poses[:, :3, 3] = transforms.apply(T_object_part, np.asarray(point_part, dtype=float)[None])[0]
+    return poses
 
 
 def annotate(
     object_id: str, config: AnnotationConfig = AnnotationConfig()
 ) -> dict[str, NDArray[Any]]:
-    """Labels one object; the arrays of ``Labels`` by name, a function of id and config alone."""
+    """Labels one object; the arrays of ``Labels`` by name, a function of id and config alone.
+
+    Raises:
+        InvalidArgumentError: no camera sees a movable part in some joint state.
+    """
     obj = catalog.load(object_id)
-    category = catalog.category_of(obj)
     rng = np.random.default_rng([config.seed, zlib.crc32(object_id.encode())])
-    latest_start = category.start_fraction[1]
-    fractions = [rng.uniform(*category.start_fraction) for _ in range(config.start_states)]
-    fractions += [rng.uniform(latest_start, config.latest) for _ in range(config.later_states)]
-    rows = [_annotate_state(obj, fraction, config, rng) for fraction in fractions]
-    stacked = [np.stack(column) for column in zip(*rows, strict=True)]
-    return dict(zip(_ARRAYS, [np.asarray(fractions), *stacked], strict=True))
+    intervals = [catalog.category_of(obj).start_fraction] * config.start_states
+    intervals += [(0.0, 1.0)] * config.open_states
+    fractions = np.array([rng.uniform(*each, len(obj.joints)) for each in intervals])
+    states = [
+        _annotate_state(obj, state, positions_at(obj, each), config, rng)
+        for state, each in enumerate(fractions)
+    ]
+    columns = [np.concatenate(column) for column in zip(*states, strict=True)]
+    return dict(zip(_ARRAYS, [fractions, *columns], strict=True))
 
 
 def _annotate_state(
-    obj: ArticulatedObject, fraction: float, config: AnnotationConfig, rng: np.random.Generator
+    obj: ArticulatedObject,
+    state: int,
+    q: Array,
+    config: AnnotationConfig,
+    rng: np.random.Generator,
 ) -> tuple[NDArray[Any], ...]:
-    part = MOVABLE_PART
-    q = obj.positions_with(part, fraction)
-    points, normals = visible_points(obj, q, part, config.points, config.views, config.yaw, rng)
-    if not len(points):
-        raise InvalidArgumentError(
-            f"{obj.object_id}: no camera sees {obj.links[part].name!r}, so that it has no labels"
+    """The arrays of one state, in the order of ``_ARRAYS`` behind the fractions."""
+    Ts_part_object = transforms.invert(obj.link_poses(q))
+    seen = {}
+    for part in range(1, obj.num_parts):
+        points, normals = visible_points(
+            obj, q, part, config.most_points, config.views, config.yaw, rng
         )
-    R_grasps = candidate_rotations(normals)
-    verdicts = judge(obj, q, part, points, R_grasps, config.filter)
-    success = np.zeros(verdicts.shape, dtype=bool)
-    ends: dict[str, int] = dict.fromkeys(TRIAL_ENDS, 0)
-    for i, c in np.argwhere(verdicts == Verdict.POSSIBLE):
-        T_object_grasp = transforms.transform_from(R_grasps[i, c], points[i])
-        trial = try_grasp(obj, q, part, T_object_grasp, config.trial)
-        success[i, c] = trial.success
-        ends[trial.end] += 1
-    T_part_object = transforms.invert(obj.link_poses(q)[part])
+        if len(points):
+            # As they are kept: whoever reads the labels makes the same tries.
+            T = Ts_part_object[part]
+            seen[part] = (
+                transforms.apply(T, points).astype(np.float32),
+                transforms.rotate(T, normals).astype(np.float32),
+            )
+    if not seen:
+        raise InvalidArgumentError(
+            f"{obj.object_id}: no camera sees a movable part at joint positions "
+            f"{q.round(3).tolist()}, so that there is nothing to label"
+        )
+    parts, chosen, normals_chosen, bits = [], [], [], []
+    verdicts = np.zeros(len(Verdict), dtype=np.int32)
+    ends = np.zeros(len(TRIAL_ENDS), dtype=np.int32)
+    for index in range(config.most_points):
+        if ends.sum() >= config.trials and len(parts) >= config.least_points:
+            break
+        for part, (points, normals) in seen.items():
+            poses = tried_poses(obj, q, part, points[index], normals[index])
+            judged = judge(obj, q, part, poses[:1, :3, 3], poses[None, :, :3, :3], config.filter)[0]
+            verdicts += np.bincount(judged, minlength=len(Verdict)).astype(np.int32)
+            success = np.zeros(NUM_CANDIDATES, dtype=bool)
+            for candidate in np.flatnonzero(judged == Verdict.POSSIBLE):
+                trial = try_grasp(obj, q, part, poses[candidate], config.trial)
+                success[candidate] = trial.success
+                ends[TRIAL_ENDS.index(trial.end)] += 1
+            parts.append(part)
+            chosen.append(points[index])
+            normals_chosen.append(normals[index])
+            bits.append(np.packbits(success, bitorder="little"))
     return (
-        transforms.apply(T_part_object, points).astype(np.float32),
-        transforms.rotate(T_part_object, normals).astype(np.float32),
-        np.packbits(success, axis=-1, bitorder="little"),
-        np.bincount(verdicts.ravel(), minlength=len(Verdict)).astype(np.int32),
-        np.array(list(ends.values()), dtype=np.int32),
+        np.full(len(parts), state, dtype=np.uint8),
+        np.array(parts, dtype=np.uint8),
+        np.stack(chosen),
+        np.stack(normals_chosen),
+        np.stack(bits),
+        verdicts[None],
+        ends[None],
     )
 
 
@@ -199,6 +266,7 @@ def annotate_split(
     root: Path | None = None,
     config: AnnotationConfig = AnnotationConfig(),
     workers: int = 1,
+    backend: str = "loky",
     progress: bool = True,
 ) -> Manifest:
     """Labels the first ``count`` objects of a split, one file each; goes on where it stopped.
@@ -218,6 +286,7 @@ def annotate_split(
         config={"annotation": asdict(config)},
         write=write_arrays,
         workers=workers,
+        backend=backend,
         progress=progress,
         description=f"labels {category}/{split}",
     )
@@ -245,7 +314,13 @@ def read_labels(object_id: str, root: Path | None = None) -> Labels:
     """
     category, _, _ = object_id.partition("/")
     folder = labels_folder(category, catalog.split_of(object_id), root)
-    arrays, _ = read_arrays(folder / label_file_name(object_id))
+    path = folder / label_file_name(object_id)
+    arrays, _ = read_arrays(path)
+    if set(arrays) != set(_ARRAYS):
+        raise DamagedFileError(
+            f"{path} holds {', '.join(sorted(arrays))}, and not {', '.join(_ARRAYS)}: it is no "
+            "label file of this version. Make it again with `artgym annotate`."
+        )
     return Labels(object_id=object_id, **arrays)
 
 

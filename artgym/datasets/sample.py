@@ -1,7 +1,7 @@
-"""What one training sample is.
+"""What pictures and samples are.
 
-A sample is one RGB-D view of one object on a table, together with everything that is known about
-the points of the object seen in it. Frames: ``camera`` is OpenCV; ``level`` shares the camera's
+A picture is one RGB-D view of objects on a table; a sample is everything that is known about the
+points of one of them that are seen in it. Frames: ``camera`` is OpenCV; ``level`` shares its
 origin but has z up and x in the viewing direction projected on the horizontal; ``part`` is the
 link's frame; ``object`` is the root link's frame. Grasp columns are (x, y = closing direction,
 z = approach).
@@ -26,26 +26,24 @@ AFFORDANCE_NO, AFFORDANCE_YES, AFFORDANCE_UNKNOWN = 0, 1, 255
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sample:
-    """One view of one object. M points seen, K parts (base = 0), G labelled surface points.
+    """One object in a picture. M points seen, K parts (base = 0), G labelled surface points.
 
     Attributes:
         object_id: catalogue id, "laptop/0012".
-        rgb: uint8 (H, W, 3).
-        depth: float32 (H, W), metres along z, 0 where nothing was seen.
-        part_mask: uint8 (H, W): part index + 1, 0 elsewhere.
-        intrinsics: float32 (3, 3).
+        box: float32 (4,): left, top, width and height of what is seen of it, pixels, as in COCO.
         R_level_camera: float32 (3, 3), from the table's normal.
-        points_camera: float32 (M, 3), metres.
+        points_camera: float32 (M, 3), metres; where the picture's depth is noisy, so are they.
         colors: uint8 (M, 3).
         part: uint8 (M,), part index of each point.
         npcs: float32 (M, 3) in [0, 1]: the point normalised in its own part's canonical box.
         naocs: float32 (M, 3) in [0, 1]: the same in the object's box, the object in rest state.
-        affordance: uint8 (M,): 1 where some tried grasp succeeded, 0 where none did, 255 where no
-            labelled surface point lies near.
+        affordance: uint8 (M,): 1 where some try carried here succeeds, 0 where none of the tries
+            at the labelled point did, 255 where nothing is known.
         grasp_row: int32 (M,): the nearest labelled surface point of the same part, an index into
             the four arrays below, -1 where none lies near.
-        grasp_bits: uint8 (G, C / 8): success of each of the C = ``NUM_CANDIDATES`` tries of
-            ``geometry.grasps.candidates_of_part``, ``np.unpackbits(..., bitorder="little")``.
+        grasp_bits: uint8 (G, C / 8): for each of the C = ``NUM_CANDIDATES`` tries of
+            ``geometry.grasps.candidates_of_part`` whether it succeeds at the point and around it,
+            ``np.unpackbits(..., bitorder="little")``.
         grasp_points_part: float32 (G, 3): the labelled points, frame of their part, metres.
         grasp_normals_part: float32 (G, 3): their outward unit normals, same frame.
         grasp_part: uint8 (G,): the part each labelled point lies on.
@@ -62,10 +60,7 @@ class Sample:
     """
 
     object_id: str
-    rgb: NDArray[np.uint8]
-    depth: NDArray[np.float32]
-    part_mask: NDArray[np.uint8]
-    intrinsics: NDArray[np.float32]
+    box: NDArray[np.float32]
     R_level_camera: NDArray[np.float32]
     points_camera: NDArray[np.float32]
     colors: NDArray[np.uint8]
@@ -107,8 +102,30 @@ class Sample:
         return candidates_of_part(self.grasp_normals_part, R_object_parts[self.grasp_part])
 
 
-#: The array fields of a sample, in order: what a file holds beside the object's id.
-ARRAY_FIELDS: tuple[str, ...] = tuple(f.name for f in fields(Sample) if f.name != "object_id")
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Picture:
+    """One RGB-D view of objects on a table.
+
+    Attributes:
+        rgb: uint8 (H, W, 3).
+        depth: float32 (H, W), metres along z, 0 where nothing was seen.
+        instance_mask: uint8 (H, W): index in ``samples`` + 1, 0 elsewhere.
+        part_mask: uint8 (H, W): part index + 1, counted in each object, 0 elsewhere.
+        intrinsics: float32 (3, 3).
+        samples: the objects seen.
+    """
+
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    instance_mask: NDArray[np.uint8]
+    part_mask: NDArray[np.uint8]
+    intrinsics: NDArray[np.float32]
+    samples: tuple[Sample, ...]
+
+
+#: The array fields of a sample and of a picture, in order: what a file holds of them.
+SAMPLE_ARRAYS: tuple[str, ...] = tuple(f.name for f in fields(Sample) if f.name != "object_id")
+PICTURE_ARRAYS: tuple[str, ...] = tuple(f.name for f in fields(Picture) if f.name != "samples")
 
 
 def level_from_camera(up_camera: ArrayLike) -> NDArray[np.float64]:

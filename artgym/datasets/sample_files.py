@@ -1,4 +1,4 @@
-"""Shards of samples: HDF5 files with one group a sample, and folders of them.
+"""Shards of pictures: HDF5 files with one group a picture, and folders of them.
 
 ``docs/data_format.md`` describes the layout for readers in other languages.
 """
@@ -9,16 +9,16 @@ import math
 import operator
 import os
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, cast, get_args, get_type_hints, overload
+from typing import Any, Generic, TypeVar, cast, get_args, get_type_hints, overload
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from artgym.datasets.sample import ARRAY_FIELDS, Sample
+from artgym.datasets.sample import PICTURE_ARRAYS, SAMPLE_ARRAYS, Picture, Sample
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import (
     DAMAGE_REMEDY,
@@ -33,17 +33,19 @@ from artgym.files import (
 )
 from artgym.geometry.grasps import NUM_CANDIDATES
 
-SAMPLES_FORMAT = "artgym-samples"
+PICTURES_FORMAT = "artgym-pictures"
 
-#: gzip level: samples are many and written once each.
-_SAMPLES_LEVEL = 1
+#: gzip level: pictures are many and written once each.
+_LEVEL = 1
 
-#: Shapes of a sample's arrays; equal letters are equal sizes within one sample.
-_SAMPLE_SHAPES: dict[str, tuple[int | str, ...]] = {
+#: Shapes of arrays; equal letters are equal sizes within one sample, or one picture.
+_SHAPES: dict[str, tuple[int | str, ...]] = {
     "rgb": ("H", "W", 3),
     "depth": ("H", "W"),
+    "instance_mask": ("H", "W"),
     "part_mask": ("H", "W"),
     "intrinsics": (3, 3),
+    "box": (4,),
     "R_level_camera": (3, 3),
     "points_camera": ("M", 3),
     "colors": ("M", 3),
@@ -76,59 +78,75 @@ def _annotated_dtype(annotation: Any) -> np.dtype[Any]:
     return np.dtype(get_args(dtype)[0])
 
 
-_SAMPLE_DTYPES = {
+_DTYPES = {
     name: _annotated_dtype(annotation)
-    for name, annotation in get_type_hints(Sample).items()
-    if name in ARRAY_FIELDS
+    for kind, names in ((Picture, PICTURE_ARRAYS), (Sample, SAMPLE_ARRAYS))
+    for name, annotation in get_type_hints(kind).items()
+    if name in names
 }
 
 
-def write_samples(path: str | os.PathLike[str], samples: Iterable[Sample]) -> None:
-    """Writes samples to one shard.
+def write_pictures(path: str | os.PathLike[str], pictures: Sequence[Picture]) -> None:
+    """Writes pictures to one shard.
 
     Raises:
         InvalidArgumentError: an array has the wrong dtype or shape, or is not finite; the message
-            names the sample and the field.
+            names the picture, the sample and the field.
         FileNotWrittenError: the system refused.
     """
 
+    def put(group: h5py.Group, value: Picture | Sample, names: Sequence[str], what: str) -> None:
+        arrays = {name: np.asarray(getattr(value, name)) for name in names}
+        if misfit := _misfit(arrays):
+            raise InvalidArgumentError(f"{what} cannot be written to {path}: {misfit}.")
+        for name, array in arrays.items():
+            put_array(group, name, array, level=_LEVEL)
+
     def fill(file: h5py.File) -> None:
-        for index, sample in enumerate(samples):
-            arrays = {name: np.asarray(getattr(sample, name)) for name in ARRAY_FIELDS}
-            if misfit := _sample_misfit(arrays):
-                raise InvalidArgumentError(
-                    f"sample {index} ({sample.object_id}) cannot be written to {path}: {misfit}."
-                )
-            group = file.create_group(_sample_name(index))
-            put_text(group, "object_id", sample.object_id)
-            for name, array in arrays.items():
-                put_array(group, name, array, level=_SAMPLES_LEVEL)
+        counts = np.array([len(picture.samples) for picture in pictures], dtype=np.int32)
+        put_array(file, _COUNTS, counts, level=_LEVEL)
+        for i, picture in enumerate(pictures):
+            group = file.create_group(_picture_name(i))
+            put(group, picture, PICTURE_ARRAYS, f"picture {i}")
+            for k, sample in enumerate(picture.samples):
+                subgroup = group.create_group(_object_name(k))
+                put_text(subgroup, "object_id", sample.object_id)
+                what = f"sample {k} of picture {i} ({sample.object_id})"
+                put(subgroup, sample, SAMPLE_ARRAYS, what)
 
-    write_file_whole(path, hdf5_image(SAMPLES_FORMAT, fill))
+    write_file_whole(path, hdf5_image(PICTURES_FORMAT, fill))
 
 
-def read_samples(path: str | os.PathLike[str]) -> list[Sample]:
-    """Reads all samples of one shard.
+def read_pictures(path: str | os.PathLike[str]) -> list[Picture]:
+    """Reads all pictures of one shard.
 
     Raises:
         DamagedFileError: the file is missing, cut short or not what it should be.
         InvalidArgumentError: it was written with another schema version.
     """
-    with opened(path, SAMPLES_FORMAT) as file:
-        return [_get_sample(file, index) for index in range(len(file))]
+    with opened(path, PICTURES_FORMAT) as file:
+        return [_get_picture(file, i, int(n)) for i, n in enumerate(_object_counts(file))]
 
 
-def _sample_name(index: int) -> str:
+#: The root's array of the number of objects in each picture.
+_COUNTS = "objects"
+
+
+def _picture_name(index: int) -> str:
     return f"{index:06d}"
 
 
-def _sample_misfit(arrays: Mapping[str, NDArray[Any]]) -> str | None:
-    """What keeps ``arrays`` from being a sample, None where nothing does."""
+def _object_name(index: int) -> str:
+    return f"object_{index:03d}"
+
+
+def _misfit(arrays: Mapping[str, NDArray[Any]]) -> str | None:
+    """What keeps ``arrays`` from being a sample or a picture, None where nothing does."""
     sizes: dict[str, int] = {}
-    for name, symbols in _SAMPLE_SHAPES.items():
-        array = arrays[name]
-        if array.dtype != _SAMPLE_DTYPES[name]:
-            return f"{name} should be {_SAMPLE_DTYPES[name]}, got {array.dtype}"
+    for name, array in arrays.items():
+        symbols = _SHAPES[name]
+        if array.dtype != _DTYPES[name]:
+            return f"{name} should be {_DTYPES[name]}, got {array.dtype}"
         # zip is allowed to cut short: the comparison below sees the number of axes.
         for symbol, size in zip(symbols, array.shape, strict=False):
             if isinstance(symbol, str):
@@ -142,23 +160,61 @@ def _sample_misfit(arrays: Mapping[str, NDArray[Any]]) -> str | None:
     return None
 
 
-def _get_sample(file: h5py.File, index: int) -> Sample:
-    group = cast(h5py.Group, file[_sample_name(index)])
+def _object_counts(file: h5py.File) -> NDArray[np.integer]:
+    """How many objects each picture of a shard shows."""
+    counts = _arrays(file, [_COUNTS], "the shard")[_COUNTS]
+    groups = sum(1 for name in file if name != _COUNTS)
+    if counts.ndim != 1 or counts.dtype.kind != "i" or len(counts) != groups:
+        raise DamagedFileError(
+            f"{_COUNTS} should be {groups} integers, got {counts.shape} of {counts.dtype}"
+        )
+    return counts
+
+
+def _arrays(group: h5py.Group, names: Sequence[str], what: str) -> dict[str, NDArray[Any]]:
     arrays = {}
-    for name in ARRAY_FIELDS:
+    for name in names:
+        # A soft or external link could lead anywhere.
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise DamagedFileError(f"sample {index} has no array {name!r}")
+            raise DamagedFileError(f"{what} has no array {name!r}")
         arrays[name] = dataset_array(name, cast(h5py.Dataset, group[name]))
-    if misfit := _sample_misfit(arrays):
-        raise DamagedFileError(f"sample {index}: {misfit}")
+    return arrays
+
+
+def _subgroup(group: h5py.Group, name: str) -> h5py.Group:
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise DamagedFileError(f"there is no group {name!r} in {group.name!r}")
+    found = group[name]
+    if not isinstance(found, h5py.Group):
+        raise DamagedFileError(f"{name!r} in {group.name!r} is no group")
+    return found
+
+
+def _get_picture(file: h5py.File, index: int, count: int) -> Picture:
+    group = _subgroup(file, _picture_name(index))
+    arrays = _arrays(group, PICTURE_ARRAYS, f"picture {index}")
+    if misfit := _misfit(arrays):
+        raise DamagedFileError(f"picture {index}: {misfit}")
+    return Picture(**arrays, samples=tuple(_get_sample(file, index, k) for k in range(count)))
+
+
+def _get_sample(file: h5py.File, picture: int, index: int) -> Sample:
+    group = _subgroup(_subgroup(file, _picture_name(picture)), _object_name(index))
+    what = f"sample {index} of picture {picture}"
+    arrays = _arrays(group, SAMPLE_ARRAYS, what)
+    if misfit := _misfit(arrays):
+        raise DamagedFileError(f"{what}: {misfit}")
     return Sample(object_id=get_text(group, "object_id"), **arrays)
 
 
-class SampleFolder(Sequence[Sample]):
-    """The samples of a folder of shards, each read when asked for.
+T = TypeVar("T")
 
-    No file stays open between two samples, so that it can be pickled, forked and shared between
-    threads. Sizes are checked at once, the checksum of a shard when its first sample is read.
+
+class _ShardFolder(Sequence[T], Generic[T]):
+    """What lies in a folder of shards, each piece read when asked for.
+
+    No file stays open between two reads, so that it can be pickled, forked and shared between
+    threads. Sizes are checked at once, the checksum of a shard when it is first read.
 
     Args:
         folder: where ``manifest.json`` lies.
@@ -185,33 +241,85 @@ class SampleFolder(Sequence[Sample]):
                 raise DamagedFileError(
                     f"{path} is damaged: expected {shard.bytes} bytes, {found}. {DAMAGE_REMEDY}"
                 )
-        # Index of the first sample of each shard, and one past the last sample of all.
-        self._starts = [0, *accumulate(shard.items for shard in self.manifest.shards)]
         self._verified: set[str] = set()
+        # Index of the first piece of each shard, and one past the last piece of all.
+        self._starts = [0, *accumulate(self._lengths())]
+
+    def _lengths(self) -> list[int]:
+        """How many pieces each shard holds."""
+        raise NotImplementedError
+
+    def _get(self, file: h5py.File, index: int, shard: int) -> T:
+        """A piece of an open shard, counted in that shard."""
+        raise NotImplementedError
 
     def __len__(self) -> int:
-        """The number of samples."""
+        """How many there are."""
         return self._starts[-1]
 
     @overload
-    def __getitem__(self, index: int) -> Sample: ...
+    def __getitem__(self, index: int) -> T: ...
     @overload
-    def __getitem__(self, index: slice) -> list[Sample]: ...
-    def __getitem__(self, index: int | slice) -> Sample | list[Sample]:
-        """One sample, or the list of a slice."""
+    def __getitem__(self, index: slice) -> list[T]: ...
+    def __getitem__(self, index: int | slice) -> T | list[T]:
+        """One of them, or the list of a slice."""
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         position = operator.index(index)
         if position < 0:
             position += len(self)
         if not 0 <= position < len(self):
-            raise IndexError(f"index {index} is outside the {len(self)} samples of {self.folder}")
-        number = bisect_right(self._starts, position) - 1
-        shard = self.manifest.shards[number]
-        path = self.folder / shard.name
-        if shard.name not in self._verified:
-            if damage := shard.damage(self.folder):
+            raise IndexError(f"index {index} is outside the {len(self)} of {self.folder}")
+        shard = bisect_right(self._starts, position) - 1
+        with opened(self._verified_path(shard), PICTURES_FORMAT) as file:
+            return self._get(file, position - self._starts[shard], shard)
+
+    def _verified_path(self, shard: int) -> Path:
+        entry = self.manifest.shards[shard]
+        path = self.folder / entry.name
+        if entry.name not in self._verified:
+            if damage := entry.damage(self.folder):
                 raise DamagedFileError(f"{path} {damage}. {DAMAGE_REMEDY}")
-            self._verified.add(shard.name)
-        with opened(path, SAMPLES_FORMAT) as file:
-            return _get_sample(file, position - self._starts[number])
+            self._verified.add(entry.name)
+        return path
+
+
+class PictureFolder(_ShardFolder[Picture]):
+    """The pictures of a folder of shards; see ``SampleFolder`` for its arguments and errors."""
+
+    def _lengths(self) -> list[int]:
+        return [shard.items for shard in self.manifest.shards]
+
+    def _get(self, file: h5py.File, index: int, shard: int) -> Picture:
+        del shard
+        return _get_picture(file, index, int(_object_counts(file)[index]))
+
+
+class SampleFolder(_ShardFolder[Sample]):
+    """The samples of a folder of shards: every object of every picture, without the pictures.
+
+    No file stays open between two reads, so that it can be pickled, forked and shared between
+    threads. Sizes are checked at once, the checksum of a shard when it is first read.
+
+    Args:
+        folder: where ``manifest.json`` lies.
+        allow_incomplete: take what is there of a folder whose making has not finished.
+
+    Raises:
+        DamagedFileError: the manifest or a shard is missing or damaged.
+        InvalidArgumentError: another schema version, or shards are still to be made.
+    """
+
+    def _lengths(self) -> list[int]:
+        #: Index of the first sample of each picture, a list a shard.
+        self._firsts: list[list[int]] = []
+        for shard in range(len(self.manifest.shards)):
+            path = self.folder / self.manifest.shards[shard].name
+            with opened(path, PICTURES_FORMAT) as file:
+                self._firsts.append([0, *accumulate(_object_counts(file).tolist())])
+        return [firsts[-1] for firsts in self._firsts]
+
+    def _get(self, file: h5py.File, index: int, shard: int) -> Sample:
+        firsts = self._firsts[shard]
+        picture = bisect_right(firsts, index) - 1
+        return _get_sample(file, picture, index - firsts[picture])

@@ -68,11 +68,14 @@ class PhysicsConfig:
     Attributes:
         timestep: seconds of one step.
         position_iterations: of the contact solver.
+        contact_offset: how near two shapes come before the solver hears of it, metres. Less is
+            faster, and must be more than shapes come nearer in one step; None is the simulator's.
         hand: gains of the hand.
     """
 
     timestep: float = 1.0 / 120.0
     position_iterations: int = 15
+    contact_offset: float | None = None
     hand: HandControl = field(default_factory=HandControl)
 
 
@@ -278,6 +281,10 @@ class ManipulationScene:
             self.hand = self._robot(T_world_base, T_world_hand, width, visuals)
             # Of an arm only the hand and its fingers count as touching.
             self._hand_links = {link: i for i, link in enumerate(self.hand.links[:3])}
+        if config.contact_offset is not None:
+            for link in self.links():
+                for shape in link.collision_shapes:
+                    shape.contact_offset = config.contact_offset
         if visuals and table_material is not None:
             # Drawn last, what others hide of it costs nothing.
             self._show_table(table_material)

@@ -5,6 +5,7 @@ Episodes and pictures draw from here, so that a network meets in one what it saw
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,10 @@ from numpy.typing import NDArray
 
 from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
 from artgym.geometry.transforms import transform_from
-from artgym.objects.model import Material, Texture
+from artgym.objects.model import Box, Cylinder, Material, Shape, Texture
+from artgym.sim.conversion import pose_from_transform
+from artgym.sim.scene import visual_body
+from artgym.sim.tabletop import Footprint
 
 Array = NDArray[np.floating]
 
@@ -80,6 +84,48 @@ def random_table(rng: np.random.Generator) -> Material:
         color = (red, red * (0.45 + 0.4 * paleness), red * (0.15 + 0.6 * paleness * blue))
         plain = replace(plain, color=color)
     return replace(plain, texture=texture)
+
+
+def add_clutter(scene: sapien.Scene, rng: np.random.Generator, taken: Sequence[Footprint]) -> None:
+    """Up to four blocks and cans on the table beside objects, for the eye alone.
+
+    Args:
+        scene: has a renderer.
+        rng: what they are drawn from.
+        taken: where objects stand.
+    """
+    places = list(taken)
+    for _ in range(int(rng.integers(0, 5))):
+        half = rng.uniform(0.015, 0.05, 3)
+        center, yaw = rng.uniform(-0.4, 0.4, 2), rng.uniform(-np.pi, np.pi)
+        upright, pattern = rng.random() < 0.5, rng.random() < 0.5
+        red, green, blue = rng.uniform(0.05, 0.95, 3).tolist()
+        look = Material(color=(red, green, blue), roughness=float(rng.uniform(0.3, 0.9)))
+        if pattern:
+            name = str(rng.choice(("stripes", "gingham", "granite", "twill")))
+            look = replace(look, texture=Texture(pattern=name, seed=0, tile=0.1))
+        place = Footprint(center, float(np.linalg.norm(half[:2])))
+        if not place.is_free(places):
+            continue
+        places.append(place)
+        block = Box(half_size=tuple(half.tolist()))
+        can = Cylinder(radius=float(half[0]), half_length=float(half[2]))
+        # A cylinder lies along x: stand it up.
+        x, y, z = matrix_from_axis_angle([0.0, -np.pi / 2 if upright else 0.0, 0.0]).tolist()
+        T_world_thing = transform_from(
+            matrix_from_axis_angle([0.0, 0.0, yaw]), [*center, float(half[2])]
+        )
+        entity = sapien.Entity()
+        entity.name = "clutter"
+        shape = Shape(
+            geometry=can if upright else block,
+            position=(0.0, 0.0, 0.0),
+            rotation=(tuple(x), tuple(y), tuple(z)),
+            material=look,
+        )
+        entity.add_component(visual_body((shape,)))
+        entity.pose = pose_from_transform(T_world_thing)
+        scene.add_entity(entity)
 
 
 def add_lights(scene: sapien.Scene, rng: np.random.Generator) -> None:

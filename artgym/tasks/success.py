@@ -90,6 +90,12 @@ class Progress(NamedTuple):
         """Half the range, gripped: the paper's successful grasp."""
         return (self.travel >= TRAVEL_THRESHOLD) & (self.gripped >= SHARE_THRESHOLD)
 
+    @property
+    def gripped_is_lost(self) -> Any:
+        """Too much was moved ungripped: gripped and straight on, what is left cannot make up."""
+        path = self.path + TRAVEL_THRESHOLD - self.travel
+        return self.path - self.gripped_path > (1.0 - SHARE_THRESHOLD) * path + _EPSILON
+
 
 def maniskill_success(progress: Progress, joint_speed: float) -> bool:
     """ManiSkill 3's rule for opening cabinets: 75 % of the range reached and nearly at rest.

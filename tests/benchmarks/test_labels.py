@@ -5,6 +5,7 @@ import pytest
 
 from artgym.annotation.annotate import Labels
 from artgym.geometry.grasps import NUM_CANDIDATES, NUM_ROLLS
+from artgym.objects import catalog
 from benchmarks.labels import statistics
 
 
@@ -13,12 +14,14 @@ def labels(success):
     normals = np.tile(np.float32([1, 0, 0]), (len(success), 1))
     return Labels(
         object_id="drawer/0000",
-        fractions=np.zeros(1),
-        points_part=np.zeros((1, len(success), 3), np.float32),
-        normals_part=normals[None],
-        bits=np.packbits(success, axis=-1, bitorder="little")[None],
+        fractions=np.zeros((1, catalog.load("drawer/0000").num_parts - 1)),
+        state=np.zeros(len(success), np.uint8),
+        part=np.ones(len(success), np.uint8),
+        points_part=np.zeros((len(success), 3), np.float32),
+        normals_part=normals,
+        bits=np.packbits(success, axis=-1, bitorder="little"),
         verdicts=np.array([[30, 20, 350]], np.int32),
-        ends=np.array([[8, 2, 15, 5]], np.int32),
+        ends=np.array([[8, 2, 15, 5, 0]], np.int32),
     )
 
 
@@ -32,6 +35,7 @@ def test_densities_and_counts():
     assert found["graspable_points"] == 0.5
     assert found["verdicts"] == {"possible": 30, "nothing between": 20, "collision": 350}
     assert found["trial_ends"]["blocked"] == 15
+    assert found["trials"] == 30
     assert [ring["density_at_graspable_points"] for ring in found["rings"]] == [1, 0, 0, 0]
 
 

@@ -1,21 +1,41 @@
-"""Samples of random content for tests of files."""
+"""Pictures of random content for tests of files."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from artgym.datasets.sample import Sample
+from artgym.datasets.sample import Picture, Sample
 from artgym.geometry.grasps import NUM_CANDIDATES
 
 
-def random_sample(
+def random_picture(
     seed: int,
     *,
     height: int = 24,
     width: int = 32,
+    num_objects: int = 1,
     num_points: int = 50,
     num_parts: int = 3,
     num_grasp_points: int = 20,
+) -> Picture:
+    """A picture with the right shapes and dtypes, and no meaning."""
+    rng = np.random.default_rng([seed, 1])
+    image = (height, width)
+    return Picture(
+        rgb=rng.integers(0, 256, (*image, 3)).astype(np.uint8),
+        depth=rng.normal(size=image).astype(np.float32),
+        instance_mask=rng.integers(0, num_objects + 1, image).astype(np.uint8),
+        part_mask=rng.integers(0, num_parts + 1, image).astype(np.uint8),
+        intrinsics=rng.normal(size=(3, 3)).astype(np.float32),
+        samples=tuple(
+            random_sample(100 * k + seed, num_points, num_parts, num_grasp_points)
+            for k in range(num_objects)
+        ),
+    )
+
+
+def random_sample(
+    seed: int, num_points: int = 50, num_parts: int = 3, num_grasp_points: int = 20
 ) -> Sample:
     """A sample with the right shapes and dtypes, and no meaning."""
     rng = np.random.default_rng(seed)
@@ -26,13 +46,10 @@ def random_sample(
     def integers(low: int, high: int, shape: tuple[int, ...], dtype: type) -> np.ndarray:
         return rng.integers(low, high, shape).astype(dtype)
 
-    image, points = (height, width), (num_points,)
+    points = (num_points,)
     return Sample(
         object_id=f"laptop/{seed:04d}",
-        rgb=integers(0, 256, (*image, 3), np.uint8),
-        depth=floats(*image),
-        part_mask=integers(0, num_parts + 1, image, np.uint8),
-        intrinsics=floats(3, 3),
+        box=floats(4),
         R_level_camera=floats(3, 3),
         points_camera=floats(num_points, 3),
         colors=integers(0, 256, (num_points, 3), np.uint8),

@@ -17,8 +17,13 @@ import pytest
 
 from artgym import files
 from artgym.datasets import sample_files
-from artgym.datasets.sample import ARRAY_FIELDS
-from artgym.datasets.sample_files import SampleFolder, read_samples, write_samples
+from artgym.datasets.sample import PICTURE_ARRAYS, SAMPLE_ARRAYS, Picture
+from artgym.datasets.sample_files import (
+    PictureFolder,
+    SampleFolder,
+    read_pictures,
+    write_pictures,
+)
 from artgym.errors import DamagedFileError, FileNotWrittenError, InvalidArgumentError
 from artgym.files import (
     MANIFEST_NAME,
@@ -29,14 +34,20 @@ from artgym.files import (
     write_arrays,
     write_file_whole,
 )
-from tests.datasets.sample_factory import random_sample
+from tests.datasets.sample_factory import random_picture
 
 CONFIG = {"seed": 7, "camera": {"width": 32, "height": 24}, "categories": ["laptop"]}
 
 
 def assert_same(left, right):
-    assert left.object_id == right.object_id
-    for name in ARRAY_FIELDS:
+    """Two pictures, or two samples, are equal to the bit."""
+    names = PICTURE_ARRAYS if isinstance(left, Picture) else SAMPLE_ARRAYS
+    if isinstance(left, Picture):
+        for mine, other in zip(left.samples, right.samples, strict=True):
+            assert_same(mine, other)
+    else:
+        assert left.object_id == right.object_id
+    for name in names:
         a, b = getattr(left, name), getattr(right, name)
         assert isinstance(b, np.ndarray), name
         assert a.dtype == b.dtype, name
@@ -45,11 +56,11 @@ def assert_same(left, right):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Three shards of 2, 0 and 3 samples with a manifest."""
+    """Three shards of 2, 0 and 3 pictures with a manifest."""
     entries = []
     for number, seeds in enumerate([(0, 1), (), (2, 3, 4)]):
         path = tmp_path / "set" / f"train-{number}.h5"
-        write_samples(path, [random_sample(seed) for seed in seeds])
+        write_pictures(path, [random_picture(seed) for seed in seeds])
         entries.append(ShardEntry.of(path, len(seeds)))
     Manifest(config=CONFIG, planned=3, shards=tuple(entries)).write(tmp_path / "set")
     return tmp_path / "set"
@@ -99,7 +110,7 @@ class TestWholeFiles:
     def test_file_where_a_folder_should_be(self, tmp_path):
         (tmp_path / "file").write_bytes(b"")
         with pytest.raises(FileNotWrittenError, match=r"cannot write .*file/x\.h5"):
-            write_samples(tmp_path / "file" / "x.h5", [])
+            write_pictures(tmp_path / "file" / "x.h5", [])
 
     def test_stale_temporaries_go_and_nothing_else(self, tmp_path):
         for name in (".artgym-x.h5.12-ab.tmp", ".other.tmp", "x.h5"):
@@ -108,10 +119,10 @@ class TestWholeFiles:
         assert sorted(p.name for p in tmp_path.iterdir()) == [".other.tmp", "x.h5"]
 
 
-class TestSamples:
+class TestPictures:
     def test_every_field_has_a_declared_shape(self):
-        assert tuple(sample_files._SAMPLE_SHAPES) == ARRAY_FIELDS
-        assert set(sample_files._SAMPLE_DTYPES) == set(ARRAY_FIELDS)
+        names = {*PICTURE_ARRAYS, *SAMPLE_ARRAYS}
+        assert set(sample_files._SHAPES) == set(sample_files._DTYPES) == names
 
     @pytest.mark.parametrize(
         "sizes",
@@ -120,24 +131,26 @@ class TestSamples:
             {"num_points": 4096, "num_grasp_points": 200, "height": 60, "width": 80},
             {"num_points": 0, "num_grasp_points": 0},
             {"num_parts": 1, "num_points": 1},
+            {"num_objects": 0},
+            {"num_objects": 4},
         ],
     )
     def test_round_trip(self, tmp_path, sizes):
-        samples = [random_sample(seed, **sizes) for seed in range(3)]
-        write_samples(tmp_path / "x.h5", samples)
-        for left, right in zip(samples, read_samples(tmp_path / "x.h5"), strict=True):
+        samples = [random_picture(seed, **sizes) for seed in range(3)]
+        write_pictures(tmp_path / "x.h5", samples)
+        for left, right in zip(samples, read_pictures(tmp_path / "x.h5"), strict=True):
             assert_same(left, right)
 
     def test_views_in_any_memory_order(self, tmp_path):
-        sample = random_sample(0)
+        sample = random_picture(0)
         flipped = dataclasses.replace(sample, depth=np.asfortranarray(sample.depth))
-        write_samples(tmp_path / "x.h5", [flipped])
-        assert_same(sample, read_samples(tmp_path / "x.h5")[0])
+        write_pictures(tmp_path / "x.h5", [flipped])
+        assert_same(sample, read_pictures(tmp_path / "x.h5")[0])
 
     def test_same_bytes_later_and_elsewhere(self, tmp_path):
-        write_samples(tmp_path / "a.h5", [random_sample(0), random_sample(1)])
+        write_pictures(tmp_path / "a.h5", [random_picture(0), random_picture(1)])
         time.sleep(1.1)  # beyond the resolution of HDF5's time stamps
-        write_samples(tmp_path / "b.h5", [random_sample(0), random_sample(1)])
+        write_pictures(tmp_path / "b.h5", [random_picture(0), random_picture(1)])
         assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
     @pytest.mark.parametrize(
@@ -150,54 +163,60 @@ class TestSamples:
         ],
     )
     def test_misfits_are_refused(self, tmp_path, field, value, message):
-        bad = dataclasses.replace(random_sample(0), **{field: value})
+        picture, where = random_picture(0), "picture 1"
+        if field in SAMPLE_ARRAYS:
+            sample = dataclasses.replace(picture.samples[0], **{field: value})
+            picture = dataclasses.replace(picture, samples=(sample,))
+            where = "sample 0 of picture 1 (laptop/0000)"
+        else:
+            picture = dataclasses.replace(picture, **{field: value})
         with pytest.raises(InvalidArgumentError, match=message) as caught:
-            write_samples(tmp_path / "x.h5", [random_sample(1), bad])
-        assert "sample 1 (laptop/0000)" in str(caught.value)
+            write_pictures(tmp_path / "x.h5", [random_picture(1), picture])
+        assert where in str(caught.value)
         assert not (tmp_path / "x.h5").exists()
 
     @pytest.mark.parametrize("size", [0, 7, 100, 4000, -1])
     def test_cut_short(self, tmp_path, size):
         path = tmp_path / "x.h5"
-        write_samples(path, [random_sample(0)])
+        write_pictures(path, [random_picture(0)])
         path.write_bytes(path.read_bytes()[:size])
         with pytest.raises(DamagedFileError, match=r"x\.h5 is damaged"):
-            read_samples(path)
+            read_pictures(path)
 
     def test_missing_foreign_and_other_version(self, tmp_path):
         with pytest.raises(DamagedFileError, match=r"x\.h5 is missing"):
-            read_samples(tmp_path / "x.h5")
+            read_pictures(tmp_path / "x.h5")
         with h5py.File(tmp_path / "foreign.h5", "w") as file:
             file["data"] = np.zeros(3)
         with pytest.raises(DamagedFileError, match=r"foreign\.h5 is damaged"):
-            read_samples(tmp_path / "foreign.h5")
+            read_pictures(tmp_path / "foreign.h5")
         write_arrays(tmp_path / "arrays.h5", {})
-        with pytest.raises(DamagedFileError, match="not 'artgym-samples'"):
-            read_samples(tmp_path / "arrays.h5")
+        with pytest.raises(DamagedFileError, match="not 'artgym-pictures'"):
+            read_pictures(tmp_path / "arrays.h5")
 
     def test_other_version(self, tmp_path, monkeypatch):
         monkeypatch.setattr(files, "SCHEMA_VERSION", 2)
-        write_samples(tmp_path / "x.h5", [])
+        write_pictures(tmp_path / "x.h5", [])
         monkeypatch.undo()
         with pytest.raises(InvalidArgumentError, match=r"x\.h5 has schema version 2, .* reads 1"):
-            read_samples(tmp_path / "x.h5")
+            read_pictures(tmp_path / "x.h5")
 
     def test_links_out_of_the_file_are_not_followed(self, tmp_path):
-        write_samples(tmp_path / "secret.h5", [random_sample(0)])
-        write_samples(tmp_path / "x.h5", [random_sample(0)])
+        write_pictures(tmp_path / "secret.h5", [random_picture(0)])
+        write_pictures(tmp_path / "x.h5", [random_picture(0)])
         with h5py.File(tmp_path / "x.h5", "r+") as file:
             del file["000000/depth"]
             file["000000/depth"] = h5py.ExternalLink("secret.h5", "000000/depth")
         with pytest.raises(DamagedFileError, match="no array 'depth'"):
-            read_samples(tmp_path / "x.h5")
+            read_pictures(tmp_path / "x.h5")
 
     def test_huge_claims_are_refused_unread(self, tmp_path):
-        write_samples(tmp_path / "x.h5", [random_sample(0)])
+        write_pictures(tmp_path / "x.h5", [random_picture(0)])
         with h5py.File(tmp_path / "x.h5", "r+") as file:
             del file["000000/depth"]
             file["000000"].create_dataset("depth", (2**20, 2**20), "f4", chunks=(16, 16))
         with pytest.raises(DamagedFileError, match="depth claims 4398046511104 bytes"):
-            read_samples(tmp_path / "x.h5")
+            read_pictures(tmp_path / "x.h5")
 
 
 class TestArrays:
@@ -326,15 +345,38 @@ def _point_sum(folder: SampleFolder, index: int) -> float:
     return float(folder[index].points_camera.sum())
 
 
+class TestPictureFolder:
+    def test_pictures_and_their_samples_come_in_the_same_order(self, tmp_path):
+        pictures = [random_picture(seed, num_objects=n) for seed, n in enumerate((2, 0, 3))]
+        write_pictures(tmp_path / "a.h5", pictures[:2])
+        write_pictures(tmp_path / "b.h5", pictures[2:])
+        shards = tuple(
+            ShardEntry.of(tmp_path / name, items) for name, items in (("a.h5", 2), ("b.h5", 1))
+        )
+        Manifest(config={}, planned=2, shards=shards).write(tmp_path)
+        for mine, theirs in zip(PictureFolder(tmp_path), pictures, strict=True):
+            assert_same(mine, theirs)
+        samples = [sample for picture in pictures for sample in picture.samples]
+        for mine, theirs in zip(SampleFolder(tmp_path), samples, strict=True):
+            assert_same(mine, theirs)
+
+    def test_a_count_that_is_a_lie_is_found(self, tmp_path):
+        write_pictures(tmp_path / "a.h5", [random_picture(0)])
+        with h5py.File(tmp_path / "a.h5", "r+") as file:
+            file["objects"][0] = 2
+        with pytest.raises(DamagedFileError, match="there is no group 'object_001'"):
+            read_pictures(tmp_path / "a.h5")
+
+
 class TestSampleFolder:
     def test_reads_like_a_list(self, folder):
         samples = SampleFolder(folder)
         assert len(samples) == 5
         assert [s.object_id for s in samples] == [f"laptop/{seed:04d}" for seed in range(5)]
-        assert_same(samples[np.int64(3)], random_sample(3))
+        assert_same(samples[np.int64(3)], random_picture(3).samples[0])
         assert samples[-1].object_id == "laptop/0004"
         assert [s.object_id for s in samples[1:3]] == ["laptop/0001", "laptop/0002"]
-        with pytest.raises(IndexError, match="index 5 is outside the 5 samples"):
+        with pytest.raises(IndexError, match="index 5 is outside the 5 of"):
             samples[5]
 
     @pytest.mark.parametrize("method", ["fork", "spawn"])
@@ -366,6 +408,6 @@ class TestSampleFolder:
         content[len(content) // 2] ^= 1
         path.write_bytes(content)
         samples = SampleFolder(folder)
-        assert_same(samples[0], random_sample(0))
+        assert_same(samples[0], random_picture(0).samples[0])
         with pytest.raises(DamagedFileError, match=r"train-2\.h5 has another checksum.*Copy it"):
             samples[2]

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from artgym.envs.scene_env import CLEARANCE, MAX_EXTENT, ArtSceneEnv, _disc
+from artgym.envs.scene_env import ArtSceneEnv
 from artgym.errors import InvalidArgumentError
 from artgym.sim.scene import TABLE_HALF_SIZE, PlacedObject
+from artgym.sim.tabletop import CLEARANCE, MAX_EXTENT, footprint
 
 
 def placed(env):
@@ -25,7 +26,7 @@ def test_objects_are_few_small_clear_of_one_another_and_on_the_table():
         assert objects[0].model.object_id == info["object_id"]
         assert 3 <= len(objects) <= 6
         counts.add(len(objects))
-        discs = [_disc(each, swept=i == 0) for i, each in enumerate(objects)]
+        discs = [footprint(each, swept=i == 0) for i, each in enumerate(objects)]
         for i, (middle, radius) in enumerate(discs):
             low, high = objects[i].model.rest_bounds
             assert np.all(high - low <= MAX_EXTENT)

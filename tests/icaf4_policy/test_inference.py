@@ -16,12 +16,17 @@ from icaf4_policy.evaluation import evaluate_sample
 from icaf4_policy.inference import Perception, ProposalConfig, _joint_from_votes, diverse
 from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.tabletop import fit_table, segment_object
-from tests.icaf4_policy.toy import toy_sample
+from tests.icaf4_policy.toy import toy_picture
 
 
 @pytest.fixture(scope="module")
-def sample():
-    return toy_sample(3, num_points=2500)
+def picture():
+    return toy_picture(3, num_points=2500)
+
+
+@pytest.fixture(scope="module")
+def sample(picture):
+    return picture.samples[0]
 
 
 @pytest.fixture(scope="module")
@@ -65,48 +70,48 @@ def test_large_top_of_an_object_is_not_the_table():
     assert origin[1] == pytest.approx(0.3, abs=1e-3)
 
 
-def test_object_is_separated_from_the_table(sample):
-    view = segment_object(sample.depth, sample.intrinsics, sample.rgb, rng=rng())
-    truth = sample.part_mask > 0
+def test_object_is_separated_from_the_table(picture, sample):
+    view = segment_object(picture.depth, picture.intrinsics, picture.rgb, rng=rng())
+    truth = picture.part_mask > 0
     assert np.sum(view.mask & truth) / np.sum(view.mask | truth) > 0.85
     np.testing.assert_allclose(view.up_camera, sample.R_level_camera[2], atol=0.01)
     assert view.points_camera.shape == (view.mask.sum(), 3)
-    np.testing.assert_array_equal(view.colors, sample.rgb[view.mask])
+    np.testing.assert_array_equal(view.colors, picture.rgb[view.mask])
 
 
-def test_excluded_pixels_stay_out(sample):
-    exclude = np.zeros(sample.depth.shape, bool)
+def test_excluded_pixels_stay_out(picture):
+    exclude = np.zeros(picture.depth.shape, bool)
     exclude[:, :60] = True
     view = segment_object(
-        sample.depth, sample.intrinsics, sample.rgb, exclude_mask=exclude, rng=rng()
+        picture.depth, picture.intrinsics, picture.rgb, exclude_mask=exclude, rng=rng()
     )
     assert not (view.mask & exclude).any()
 
 
-def test_empty_table_is_refused(sample):
+def test_empty_table_is_refused(picture, sample):
     points_up = sample.R_level_camera[2]
-    v, u = np.mgrid[: sample.depth.shape[0], : sample.depth.shape[1]] + 0.5
-    K = sample.intrinsics
+    v, u = np.mgrid[: picture.depth.shape[0], : picture.depth.shape[1]] + 0.5
+    K = picture.intrinsics
     rays = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)], axis=-1)
     depth = -0.5 / (rays @ points_up)
     depth[(depth < 0) | (depth > 3)] = 0
     with pytest.raises(InvalidArgumentError, match="stand out above the table"):
-        segment_object(depth, K, sample.rgb, rng=rng())
+        segment_object(depth, K, picture.rgb, rng=rng())
 
 
-def test_blind_camera_is_refused(sample):
+def test_blind_camera_is_refused(picture):
     with pytest.raises(InvalidArgumentError, match="0 valid pixels"):
-        segment_object(np.zeros_like(sample.depth), sample.intrinsics, sample.rgb, rng=rng())
+        segment_object(np.zeros_like(picture.depth), picture.intrinsics, picture.rgb, rng=rng())
 
 
-def test_images_of_different_sizes_are_refused(sample):
+def test_images_of_different_sizes_are_refused(picture):
     with pytest.raises(InvalidArgumentError, match="same size"):
-        segment_object(sample.depth[:-1], sample.intrinsics, sample.rgb, rng=rng())
+        segment_object(picture.depth[:-1], picture.intrinsics, picture.rgb, rng=rng())
 
 
-def test_prediction_is_complete_and_repeatable(perception, sample):
-    first, view = perception.perceive(sample.rgb, sample.depth, sample.intrinsics, rng=rng())
-    again, _ = perception.perceive(sample.rgb, sample.depth, sample.intrinsics, rng=rng())
+def test_prediction_is_complete_and_repeatable(perception, picture):
+    first, view = perception.perceive(picture.rgb, picture.depth, picture.intrinsics, rng=rng())
+    again, _ = perception.perceive(picture.rgb, picture.depth, picture.intrinsics, rng=rng())
     np.testing.assert_array_equal(first.grasps.scores, again.grasps.scores)
     np.testing.assert_array_equal(first.points_camera, view.points_camera[first.point_index])
     np.testing.assert_allclose(first.part_probability.sum(axis=1), 1.0, rtol=1e-5)
@@ -119,8 +124,8 @@ def test_prediction_is_complete_and_repeatable(perception, sample):
     assert set(grasps.of_part(1).parts) <= {1}
 
 
-def test_proposals_differ_from_one_another(perception, sample):
-    prediction, _ = perception.perceive(sample.rgb, sample.depth, sample.intrinsics, rng=rng())
+def test_proposals_differ_from_one_another(perception, picture):
+    prediction, _ = perception.perceive(picture.rgb, picture.depth, picture.intrinsics, rng=rng())
     grasps, config = prediction.grasps, perception.proposals
     apart = np.linalg.norm(grasps.points_camera[:, None] - grasps.points_camera, axis=-1)
     turned = grasp_angle(grasps.R_camera_grasp[:, None], grasps.R_camera_grasp[None])
@@ -184,13 +189,13 @@ def test_evaluation_gives_every_metric(perception, sample):
     assert 0 < row["label_density"] <= row["label_density_graspable"] <= 1
 
 
-def test_predict_command(perception, sample, tmp_path, capsys):
+def test_predict_command(perception, picture, tmp_path, capsys):
     weights = tmp_path / "toy.safetensors"
     save_model(weights, perception.model, {})
-    Image.fromarray(sample.rgb).save(tmp_path / "rgb.png")
-    depth_mm = (sample.depth * 1000).round().astype(np.uint16)
+    Image.fromarray(picture.rgb).save(tmp_path / "rgb.png")
+    depth_mm = (picture.depth * 1000).round().astype(np.uint16)
     Image.fromarray(depth_mm).save(tmp_path / "depth.png")
-    (tmp_path / "K.json").write_text(json.dumps(sample.intrinsics.tolist()))
+    (tmp_path / "K.json").write_text(json.dumps(picture.intrinsics.tolist()))
     arguments = ["predict", "--weights", weights, "--rgb", tmp_path / "rgb.png"]
     arguments += ["--depth", tmp_path / "depth.png", "--intrinsics", tmp_path / "K.json"]
     arguments += ["--picture", tmp_path / "seen.png", "--grasps", 3]

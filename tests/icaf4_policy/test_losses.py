@@ -10,7 +10,13 @@ from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import axis_anchors, grasps_from_residuals
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Outputs
-from icaf4_policy.targets import DrawConfig, draw_batch, successful_grasps, targets_from_sample
+from icaf4_policy.targets import (
+    DrawConfig,
+    collate_items,
+    draw_item,
+    successful_grasps,
+    targets_from_sample,
+)
 from tests.icaf4_policy.toy import toy_sample
 
 UNIT = 0.25
@@ -21,7 +27,8 @@ SURE = 50.0
 def batch():
     targets = [targets_from_sample(toy_sample(i), axis_anchors(45), 512) for i in range(2)]
     draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
-    return draw_batch(targets, draw, [np.random.default_rng(i) for i in range(2)])
+    items = [draw_item(t, draw, np.random.default_rng(i)) for i, t in enumerate(targets)]
+    return collate_items(items, draw)
 
 
 def truthful_outputs(batch):
@@ -134,6 +141,6 @@ def test_a_sample_without_any_success_can_be_trained_on():
     )
     draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
     targets = targets_from_sample(hopeless, axis_anchors(45), 512)
-    batch = draw_batch([targets], draw, [np.random.default_rng(0)])
+    batch = collate_items([draw_item(targets, draw, np.random.default_rng(0))], draw)
     terms = loss_terms(truthful_outputs(batch), batch, UNIT)
     assert total_loss(terms, LossWeights()).item() == pytest.approx(0.0, abs=1e-5)

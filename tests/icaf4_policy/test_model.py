@@ -9,7 +9,7 @@ from icaf4_policy.anchors import axis_anchors
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig
-from icaf4_policy.targets import DrawConfig, draw_batch, targets_from_sample
+from icaf4_policy.targets import DrawConfig, collate_items, draw_item, targets_from_sample
 from tests.icaf4_policy.toy import toy_sample
 
 SMALL = ModelConfig(
@@ -24,7 +24,8 @@ DRAW = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
 
 def toy_batch(count=2):
     targets = [targets_from_sample(toy_sample(i), axis_anchors(45), 512) for i in range(count)]
-    return draw_batch(targets, DRAW, [np.random.default_rng(i) for i in range(count)])
+    items = [draw_item(t, DRAW, np.random.default_rng(i)) for i, t in enumerate(targets)]
+    return collate_items(items, DRAW)
 
 
 @pytest.fixture

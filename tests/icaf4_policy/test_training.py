@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from artgym.datasets.sample_files import write_samples
+from artgym.datasets.sample_files import write_pictures
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import Manifest, ShardEntry
 from icaf4_policy import cli
@@ -13,7 +13,7 @@ from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
 from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.training import TrainingConfig, resume_path, train
-from tests.icaf4_policy.toy import toy_sample
+from tests.icaf4_policy.toy import toy_picture, toy_sample
 
 CONFIG = TrainingConfig(
     category="toy",
@@ -87,7 +87,8 @@ def test_both_splits_must_be_there(tmp_path, samples):
 def test_train_command(tmp_path, samples, capsys):
     for split, part in zip(("train", "val"), samples, strict=True):
         folder = tmp_path / "data" / "toy" / split
-        write_samples(folder / "0000.h5", part)
+        pictures = [toy_picture(int(sample.object_id[-4:])) for sample in part]
+        write_pictures(folder / "0000.h5", pictures)
         shard = ShardEntry.of(folder / "0000.h5", len(part))
         Manifest(config={}, planned=1, shards=(shard,)).write(folder)
     weights = tmp_path / "weights" / "toy.safetensors"

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, Sample, level_from_camera
+from artgym.datasets.sample import (
+    JOINT_NONE,
+    JOINT_REVOLUTE,
+    Picture,
+    Sample,
+    level_from_camera,
+)
 from artgym.geometry.camera import intrinsics_from_fov, look_at, project
 from artgym.geometry.grasps import candidates_of_part
 from artgym.geometry.rotations import matrix_from_axis_angle
@@ -26,6 +32,11 @@ def _box_surface(size: np.ndarray, count: int, rng: np.random.Generator):
 
 
 def toy_sample(seed: int = 0, num_points: int = 700) -> Sample:
+    """The object in ``toy_picture``."""
+    return toy_picture(seed, num_points).samples[0]
+
+
+def toy_picture(seed: int = 0, num_points: int = 700) -> Picture:
     """One view of the object: both boxes, as if seen through, on a table at height 0."""
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0.3, 1.4)
@@ -68,12 +79,11 @@ def toy_sample(seed: int = 0, num_points: int = 700) -> Sample:
     intrinsics = intrinsics_from_fov(WIDTH, HEIGHT, np.radians(45))
     depth, mask, rgb = draw_scene(points_camera, part, T_world_camera, intrinsics)
     colors = np.where(part[:, None] == 0, [200, 60, 60], [60, 60, 200])
-    return Sample(
+    rows, columns = np.nonzero(mask)
+    left, top = columns.min(), rows.min()
+    sample = Sample(
         object_id=f"toy/{seed:04d}",
-        rgb=rgb,
-        depth=depth,
-        part_mask=mask,
-        intrinsics=intrinsics.astype(np.float32),
+        box=np.array([left, top, columns.max() + 1 - left, rows.max() + 1 - top], np.float32),
         R_level_camera=level_from_camera(T_world_camera[2, :3]).astype(np.float32),
         points_camera=points_camera.astype(np.float32),
         colors=colors.astype(np.uint8),
@@ -101,6 +111,14 @@ def toy_sample(seed: int = 0, num_points: int = 700) -> Sample:
             [np.zeros(3), apply(T_camera_object, pivot_object[None])[0]]
         ).astype(np.float32),
         open_fraction=np.array([0.0, angle / 2.0], np.float32),
+    )
+    return Picture(
+        rgb=rgb,
+        depth=depth,
+        instance_mask=(mask > 0).astype(np.uint8),
+        part_mask=mask,
+        intrinsics=intrinsics.astype(np.float32),
+        samples=(sample,),
     )
 
 

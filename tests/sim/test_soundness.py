@@ -225,7 +225,8 @@ def test_command_line(capsys, monkeypatch):
         (["check", "--all", "--category", "labtop"], "Nearest: 'laptop'"),
         (["check", "--all", "--split", "tests"], "Nearest: 'test'"),
         (["objects", "--count", "0"], "count=0"),
-        (["generate", "--category", "drawer", "--split", "tain", "--out", "x"], "Nearest: 'train'"),
+        (["generate", "artimage", "--split", "tain", "--out", "x"], "Nearest: 'train'"),
+        (["generate", "reartmix", "--category", "drwer", "--out", "x"], "Nearest: 'drawer'"),
         (["annotate", "--category", "drawr", "--out", "x"], "Nearest: 'drawer'"),
     ],
 )

@@ -1,0 +1,1 @@
+"""Looking: picture sheets and 3D pages of objects, labels and samples, for people."""
