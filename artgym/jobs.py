@@ -1,4 +1,4 @@
-"""Shards of work over local processes, or over a cluster engine that joblib knows.
+"""Shards of work over local processes, or over a cluster (``artgym.engines``).
 
 A shard's content depends on its arguments alone, so that any number of workers gives the same
 bytes. The folder can be left at any moment, even by a power cut: the next call with the same
@@ -8,23 +8,21 @@ configuration makes what is missing.
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
 import time
 import traceback
-from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar
 
-from joblib import Parallel, delayed, parallel_config
-from joblib.externals.loky.process_executor import TerminatedWorkerError
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from artgym.engines import WorkerDiedError, require_engine, started_engine
 from artgym.errors import ArtgymError, FileNotWrittenError, InvalidArgumentError
 from artgym.files import (
     MANIFEST_NAME,
@@ -37,6 +35,8 @@ from artgym.files import (
 
 #: How many worker processes one shard may take down before it is set aside.
 MAX_DEATHS = 3
+#: Seconds that a shard may take unless the caller says otherwise.
+DEFAULT_TIMEOUT = 1800.0
 
 A = TypeVar("A")
 
@@ -78,14 +78,16 @@ def run_shards(
     write: Callable[[Path, Any], None] = write_arrays,
     workers: int = 1,
     backend: str = "loky",
+    timeout: float | None = DEFAULT_TIMEOUT,
     progress: bool = True,
     description: str = "shards",
 ) -> Manifest:
     """Makes every shard that ``folder`` does not hold yet.
 
-    A shard already there is kept if its checksum is right. With several workers, a process that
-    dies costs its shard, which is tried again alone; after ``MAX_DEATHS`` deaths it is set aside.
-    A shard whose ``make`` raises is set aside at once, since it would raise again.
+    A shard already there is kept if its checksum is right. A worker process that dies, or takes
+    longer than ``timeout`` and is killed, costs its shard, which is tried again after the others;
+    the last of ``MAX_DEATHS`` tries is made alone, then it is set aside. A shard whose ``make``
+    raises is set aside at once, since it would raise again.
 
     Args:
         tasks: the shards, with unique names.
@@ -97,9 +99,14 @@ def run_shards(
             configuration is refused.
         write: writes the content to a path, whole and deterministically (``write_samples``,
             ``write_arrays``).
-        workers: processes; 1 works in this one.
-        backend: "loky" for processes of this machine, or a joblib backend connected to a cluster
-            ("dask", "ray").
+        workers: processes. 1 with "loky" works in this process, whose death ends the run and
+            whose time is not limited.
+        backend: "loky" for processes of this machine; "dask" or "ray" for the cluster that this
+            process is connected to (``distributed.Client(...)``, ``ray.init(...)``), or, if it is
+            connected to none, for one on this machine with so many workers, closed at the end.
+            A script that calls this with "dask" needs ``if __name__ == "__main__":``.
+        timeout: seconds that a shard may take, with the start of its worker; None for no limit.
+            Time in the queue of a busy cluster does not count.
         progress: show a bar with rate and time left on stderr.
         description: the bar's label.
 
@@ -107,15 +114,21 @@ def run_shards(
         The manifest of the finished folder.
 
     Raises:
-        InvalidArgumentError: bad names or workers, or the folder belongs to something else.
+        InvalidArgumentError: bad names, workers, backend or timeout, or the folder belongs to
+            something else.
+        MissingDependencyError: dask or ray is not installed.
         DamagedFileError: the folder's manifest cannot be read.
         FileNotWrittenError: the disk is full or the folder read-only; what was made is kept.
         ShardsFailedError: some shards could not be made; all others were.
+        WorkerError: the cluster is gone, or does not let a worker that hangs be killed.
     """
     # Absolute, since workers keep the working directory in which they started.
     folder = Path(folder).absolute()
     if workers < 1:
         raise InvalidArgumentError(f"workers={workers}: expected 1 or more.")
+    if timeout is not None and not timeout > 0:
+        raise InvalidArgumentError(f"timeout={timeout}: expected seconds above 0, or None.")
+    require_engine(backend)
     names = [task.name for task in tasks]
     for name, count in Counter(names).items():
         require_shard_name(name)
@@ -136,7 +149,7 @@ def run_shards(
             file=sys.stderr,
             disable=not progress,
         ) as bar,
-        closing(_outcomes(missing, make, write, folder, workers, backend)) as outcomes,
+        closing(_outcomes(missing, make, write, folder, workers, backend, timeout)) as outcomes,
     ):
         for outcome in outcomes:
             if outcome.unwritable:
@@ -204,95 +217,89 @@ def _outcomes(
     folder: Path,
     workers: int,
     backend: str,
+    timeout: float | None,
 ) -> Generator[_Outcome, None, None]:
     """Works through ``tasks``, yielding as they finish."""
-    if workers == 1:
+    if not tasks:
+        return
+    if workers == 1 and backend == "loky":
         for task in tasks:
             yield _finished_shard(task, make, write, folder)
         return
 
-    deaths: Counter[str] = Counter()
-    waiting = {task.name: task for task in tasks}
-    suspects: list[ShardTask[A]] = []
-    while waiting:
-        # A death takes down all that runs at that time. Each of these is then tried alone, which
-        # tells the shard that kills from those that were its neighbours.
-        batch = [suspects.pop()] if suspects else list(waiting.values())
-        started: dict[str, ShardTask[A]] = {}
-        try:
-            for outcome in _parallel_outcomes(
-                _recorded(batch, started), make, write, folder, workers, backend
-            ):
-                del waiting[outcome.name]
-                yield outcome
-        except TerminatedWorkerError:
-            lost = [task for name, task in started.items() if name in waiting]
-            suspects.extend(lost)
-            if len(lost) == 1:
-                name = lost[0].name
-                deaths[name] += 1
-                if deaths[name] == MAX_DEATHS:
-                    suspects.pop()
-                    del waiting[name]
-                    failure = (
-                        f"its worker process died {MAX_DEATHS} times (killed by the system, "
-                        "often for want of memory, or crashed in native code)"
-                    )
-                    yield _Outcome(name=name, failure=failure)
+    with started_engine(backend, workers) as engine:
+        waiting = deque(tasks)
+        #: Tried alone when nothing else runs, so that it has all the memory there is.
+        last_tries: deque[ShardTask[A]] = deque()
+        losses: dict[str, list[str]] = {}
+        running: dict[Future[_Outcome], _Try[A]] = {}
+        while waiting or running or last_tries:
+            while len(running) < workers and (waiting or (last_tries and not running)):
+                task = waiting.popleft() if waiting else last_tries.popleft()
+                future = engine.submit(_finished_shard, task, make, write, folder)
+                running[future] = _Try(task, began=time.monotonic())
+
+            lost: list[tuple[ShardTask[A], str]] = []
+            for future in _done(running, timeout):
+                task = running.pop(future).task
+                try:
+                    outcome = engine.result(future)
+                except WorkerDiedError:
+                    lost.append((task, "died"))
+                else:
+                    yield outcome
+            for future in _overdue(running, timeout):
+                if engine.end(future):
+                    task = running.pop(future).task
+                    lost.append((task, f"took longer than timeout={timeout:g} s"))
+                else:
+                    running[future].began = time.monotonic()
+
+            for task, loss in lost:
+                before = losses.setdefault(task.name, [])
+                before.append(loss)
+                if len(before) == MAX_DEATHS:
+                    yield _Outcome(name=task.name, failure=_losses_message(before))
+                else:
+                    (last_tries if len(before) == MAX_DEATHS - 1 else waiting).append(task)
 
 
-def _recorded(
-    tasks: Iterable[ShardTask[A]], started: dict[str, ShardTask[A]]
-) -> Iterator[ShardTask[A]]:
-    for task in tasks:
-        started[task.name] = task
-        yield task
+@dataclass
+class _Try(Generic[A]):
+    """A shard that a worker has, and since when by the monotonic clock."""
+
+    task: ShardTask[A]
+    began: float
 
 
-def _parallel_outcomes(
-    tasks: Iterable[ShardTask[A]],
-    make: Callable[[A], Any],
-    write: Callable[[Path, Any], None],
-    folder: Path,
-    workers: int,
-    backend: str,
-) -> Generator[_Outcome, None, None]:
-    """Outcomes in the order they come; no more than ``workers`` tasks are taken ahead."""
-    # Threads are limited at start too: a library that a worker imports late is not seen otherwise.
-    options: dict[str, Any] = {}
-    if backend == "loky":
-        options = {
-            "inner_max_num_threads": 1,
-            "initializer": _follow_parent,
-            "initargs": (os.getpid(),),
-        }
-    with parallel_config(backend=backend, n_jobs=workers, **options):
-        parallel = Parallel(
-            return_as="generator_unordered",
-            batch_size=1,  # pyright: ignore[reportArgumentType]
-            pre_dispatch=workers,  # pyright: ignore[reportArgumentType]
-            max_nbytes=None,
-        )
-        finished = parallel(delayed(_finished_shard)(task, make, write, folder) for task in tasks)
-        with closing(cast(Generator[_Outcome, None, None], finished)) as outcomes:
-            yield from outcomes
+def _done(
+    running: Mapping[Future[_Outcome], _Try[A]], timeout: float | None
+) -> list[Future[_Outcome]]:
+    """Waits until something is done or overdue; what is done, in the order of its start."""
+    patience = None
+    if timeout is not None:
+        first = min(each.began for each in running.values())
+        patience = max(0.0, first + timeout - time.monotonic())
+    done = wait(running, timeout=patience, return_when=FIRST_COMPLETED).done
+    return [future for future in running if future in done]
 
 
-def _follow_parent(parent: int) -> None:
-    """Makes a worker end when its parent does, and only then.
+def _overdue(
+    running: Mapping[Future[_Outcome], _Try[A]], timeout: float | None
+) -> list[Future[_Outcome]]:
+    now = time.monotonic()
+    return [
+        future
+        for future, each in running.items()
+        if timeout is not None and now >= each.began + timeout and not future.done()
+    ]
 
-    The parent may have died before the worker came so far: it says itself who it is.
-    """
-    # Ctrl-C reaches every process of the terminal; the parent ends its workers itself.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
 
-
-def _end_with_parent(parent: int) -> None:
-    """A killed parent says no goodbye, and loky's workers would linger with all their memory."""
-    while os.getppid() == parent:
-        time.sleep(1.0)
-    os._exit(1)
+def _losses_message(losses: Sequence[str]) -> str:
+    """Why a shard is set aside, "its worker died 2 times and took longer ... 1 times (...)"."""
+    counted = " and ".join(f"{loss} {count} times" for loss, count in Counter(losses).items())
+    reason = "killed by the system, often for want of memory, or crashed in native code"
+    return f"its worker process {counted}" + (f" ({reason})" if "died" in losses else "")
 
 
 def _finished_shard(

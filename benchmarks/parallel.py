@@ -14,7 +14,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from tqdm import tqdm
 
 from artgym.errors import InvalidArgumentError, WorkerError
-from benchmarks.threads import ONE_THREAD
+from artgym.threads import ONE_THREAD
 
 T = TypeVar("T")
 R = TypeVar("R")

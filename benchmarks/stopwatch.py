@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artgym.errors import ArtgymError, MissingDependencyError, RendererUnavailableError
-from benchmarks.threads import ONE_THREAD
+from artgym.threads import ONE_THREAD
 
 Array = NDArray[np.floating]
 
