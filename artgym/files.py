@@ -54,6 +54,17 @@ DAMAGE_REMEDY = (
     "Copy it again, or repeat the command that made the folder: it replaces damaged files."
 )
 
+#: What may be raised where an HDF5 file is read that is not what it should be.
+UNREADABLE = (
+    AttributeError,
+    DamagedFileError,
+    KeyError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+
 # --- Whole files ---------------------------------------------------------------------------------
 
 
@@ -266,15 +277,7 @@ def opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File
         raise
     except FileNotFoundError as error:
         raise DamagedFileError(f"{path} is missing. {DAMAGE_REMEDY}") from error
-    except (
-        AttributeError,
-        DamagedFileError,
-        KeyError,
-        OSError,
-        RuntimeError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except UNREADABLE as error:
         raise DamagedFileError(f"{path} is damaged: {error}. {DAMAGE_REMEDY}") from error
 
 

@@ -7,22 +7,22 @@ a number that still fits its field cannot be found.
 from __future__ import annotations
 
 import math
-import operator
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args, overload
+from typing import Any, Literal, get_args
 
 import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from artgym.datasets.lazy import LazySequence
 from artgym.datasets.sample import AFFORDANCE_NO, AFFORDANCE_YES, JOINT_NONE, JOINT_REVOLUTE
 from artgym.errors import DamagedFileError, InvalidArgumentError, UnknownNameError
-from artgym.files import dataset_array
+from artgym.files import UNREADABLE, dataset_array
 from artgym.geometry.rotations import matrix_from_quaternion
 
 #: The authors' lists of images. Their validation images are their test images.
@@ -163,15 +163,7 @@ def _named_damage(path: Path) -> Iterator[None]:
         if not path.is_file():
             raise DamagedFileError("it is not a file" if path.exists() else "it is missing")
         yield
-    except (
-        AttributeError,
-        DamagedFileError,
-        KeyError,
-        OSError,
-        RuntimeError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except UNREADABLE as error:
         raise DamagedFileError(f"{path} cannot be used: {error}. {_REMEDY}") from error
 
 
@@ -282,7 +274,7 @@ def _grasp_rotations(
     return rotations
 
 
-class AuthorsFolder(Sequence[AuthorsSample]):
+class AuthorsFolder(LazySequence[AuthorsSample]):
     """The files of one of the authors' lists, each read when asked for.
 
     No file stays open between two samples, so that it can be pickled, forked and shared between
@@ -338,19 +330,7 @@ class AuthorsFolder(Sequence[AuthorsSample]):
         """The number of samples."""
         return len(self.image_ids)
 
-    @overload
-    def __getitem__(self, index: int) -> AuthorsSample: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[AuthorsSample]: ...
-    def __getitem__(self, index: int | slice) -> AuthorsSample | list[AuthorsSample]:
-        """One sample, or the list of a slice."""
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        position = operator.index(index)
-        if position < 0:
-            position += len(self)
-        if not 0 <= position < len(self):
-            raise IndexError(f"index {index} is outside the {len(self)} samples of {self.folder}")
+    def _item(self, position: int) -> AuthorsSample:
         return read_authors_file(self.folder / f"{self.image_ids[position]}.h5")
 
 

@@ -6,18 +6,19 @@
 from __future__ import annotations
 
 import math
-import operator
 import os
+from abc import abstractmethod
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast, get_args, get_type_hints, overload
+from typing import Any, TypeVar, cast, get_args, get_type_hints
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from artgym.datasets.lazy import LazySequence
 from artgym.datasets.sample import PICTURE_ARRAYS, SAMPLE_ARRAYS, Picture, Sample
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import (
@@ -210,20 +211,8 @@ def _get_sample(file: h5py.File, picture: int, index: int) -> Sample:
 T = TypeVar("T")
 
 
-class _ShardFolder(Sequence[T], Generic[T]):
-    """What lies in a folder of shards, each piece read when asked for.
-
-    No file stays open between two reads, so that it can be pickled, forked and shared between
-    threads. Sizes are checked at once, the checksum of a shard when it is first read.
-
-    Args:
-        folder: where ``manifest.json`` lies.
-        allow_incomplete: take what is there of a folder whose making has not finished.
-
-    Raises:
-        DamagedFileError: the manifest or a shard is missing or damaged.
-        InvalidArgumentError: another schema version, or shards are still to be made.
-    """
+class _ShardFolder(LazySequence[T]):
+    """Pieces of shards; see ``SampleFolder`` for the arguments and errors."""
 
     def __init__(self, folder: str | os.PathLike[str], *, allow_incomplete: bool = False) -> None:
         self.folder = Path(folder)
@@ -245,31 +234,19 @@ class _ShardFolder(Sequence[T], Generic[T]):
         # Index of the first piece of each shard, and one past the last piece of all.
         self._starts = [0, *accumulate(self._lengths())]
 
+    @abstractmethod
     def _lengths(self) -> list[int]:
         """How many pieces each shard holds."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _get(self, file: h5py.File, index: int, shard: int) -> T:
         """A piece of an open shard, counted in that shard."""
-        raise NotImplementedError
 
     def __len__(self) -> int:
         """How many there are."""
         return self._starts[-1]
 
-    @overload
-    def __getitem__(self, index: int) -> T: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[T]: ...
-    def __getitem__(self, index: int | slice) -> T | list[T]:
-        """One of them, or the list of a slice."""
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        position = operator.index(index)
-        if position < 0:
-            position += len(self)
-        if not 0 <= position < len(self):
-            raise IndexError(f"index {index} is outside the {len(self)} of {self.folder}")
+    def _item(self, position: int) -> T:
         shard = bisect_right(self._starts, position) - 1
         with opened(self._verified_path(shard), PICTURES_FORMAT) as file:
             return self._get(file, position - self._starts[shard], shard)

@@ -355,7 +355,7 @@ class TestFolder:
         assert samples[np.int64(-1)].urdf_id == 10040
         assert [sample.urdf_id for sample in samples[:1]] == [10042]
         assert AuthorsFolder(root, "laptop", "test")[0].urdf_id == 10041
-        with pytest.raises(IndexError, match="index 2 is outside the 2 samples"):
+        with pytest.raises(IndexError, match="index 2 is outside the 2 of"):
             samples[2]
 
     def test_files_in_another_folder(self, root):
