@@ -98,9 +98,9 @@ class GenerationConfig:
     min_points: int = 600
     min_scene_points: int = 150
     clearance: float = 0.004
-    label_radius: float = 0.005
+    label_radius: float = 0.003
     label_angle: float = 0.7
-    label_margin: float = 0.002
+    label_margin: float = 0.003
     depth_noise: bool = False
     seed: int = 0
 
