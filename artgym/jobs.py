@@ -91,13 +91,13 @@ def run_shards(
 
     Args:
         tasks: the shards, with unique names.
-        make: gives a shard's content, a sized collection (samples, or arrays by name), from its
+        make: gives a shard's content, a sized collection (pictures, or arrays by name), from its
             arguments alone. It runs with one BLAS and torch thread. The manifest is written after
             each shard, so let a shard take seconds or more.
         folder: where the shards and the manifest go; on a cluster, one that all machines share.
         config: JSON values that determine every task's arguments; a folder made with another
             configuration is refused.
-        write: writes the content to a path, whole and deterministically (``write_samples``,
+        write: writes the content to a path, whole and deterministically (``write_pictures``,
             ``write_arrays``).
         workers: processes. 1 with "loky" works in this process, whose death ends the run and
             whose time is not limited.

@@ -17,7 +17,7 @@ from rich.table import Table
 from torch.utils.data import DataLoader
 
 from artgym.datasets.generate import SETS, generate_artimage
-from artgym.datasets.sample_files import SampleFolder
+from artgym.datasets.picture_files import SampleFolder
 from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from benchmarks import record

@@ -219,7 +219,6 @@ def measure(config: LabelSpeedConfig) -> dict[str, Any]:
     """Measures everything and writes ``label_speed.json``."""
     tasks = point_tasks(config)
     in_order = functools.partial(results_in_order, unit="point")
-    # One process and several by turns would need both to be warm: the points are long enough.
     began = time.perf_counter()
     found = in_order(judge_point, tasks, workers=config.workers, description="verdicts")
     several = time.perf_counter() - began

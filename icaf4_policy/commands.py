@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from artgym.datasets.sample_files import SampleFolder
+from artgym.datasets.picture_files import SampleFolder
 from artgym.errors import InvalidArgumentError
 from icaf4_policy import drawing
 from icaf4_policy.checkpoint import description_path

@@ -23,8 +23,8 @@ from artgym.annotation.annotate import (
     read_labels,
     visible_points,
 )
+from artgym.datasets.picture_files import write_pictures
 from artgym.datasets.sample import AFFORDANCE_YES, Picture
-from artgym.datasets.sample_files import write_pictures
 from artgym.errors import RendererUnavailableError
 from artgym.files import Manifest, ShardEntry, write_arrays
 from artgym.geometry import transforms
@@ -37,7 +37,7 @@ from artgym.show.cast import cast_picture, fitting_view, seen_points, visible
 from artgym.show.grasp_choice import spread_grasps
 from artgym.show.page import Layer, Page, object_layers
 from artgym.show.sheet import GAP, Panel, Ramp, sheet_png
-from tests.datasets.sample_factory import random_picture
+from tests.datasets.picture_factory import random_picture
 
 DRAWER = "drawer/1000"
 PANELS_WIDE = 3 * 480 + 4 * GAP

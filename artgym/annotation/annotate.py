@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -108,16 +108,8 @@ class Labels:
         )
 
 
-_ARRAYS = (
-    "fractions",
-    "state",
-    "part",
-    "points_part",
-    "normals_part",
-    "bits",
-    "verdicts",
-    "ends",
-)
+#: What a file holds of ``Labels``, in order.
+_ARRAYS = tuple(f.name for f in fields(Labels) if f.name != "object_id")
 
 
 def positions_at(obj: ArticulatedObject, fractions: Array) -> Array:

@@ -178,7 +178,7 @@ class _Attempt:
 
     def _approach_is_blocked(self, approach: Array) -> bool:
         """Brings the open hand to the grasp: whether it was pushed away, or pushed a part."""
-        config, blocked = self._config, False
+        config = self._config
         self._advance(1)
         blocked = self._misses(approach[0])
         for target in poses_from_transforms(approach[1:]):

@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from artgym.annotation.annotate import labelled_ids, positions_at, read_labels
 from artgym.annotation.filter import FilterConfig, Verdict, judge
 from artgym.datasets.depth_noise import sensed_depth
+from artgym.datasets.picture_files import write_pictures
 from artgym.datasets.sample import (
     AFFORDANCE_NO,
     AFFORDANCE_UNKNOWN,
@@ -32,7 +33,6 @@ from artgym.datasets.sample import (
     Sample,
     level_from_camera,
 )
-from artgym.datasets.sample_files import write_pictures
 from artgym.errors import InvalidArgumentError
 from artgym.files import Manifest
 from artgym.geometry import transforms

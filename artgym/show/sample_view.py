@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from artgym.datasets.drawing import Color
+from artgym.datasets.picture_files import PictureFolder
 from artgym.datasets.sample import (
     AFFORDANCE_NO,
     AFFORDANCE_UNKNOWN,
@@ -20,7 +21,6 @@ from artgym.datasets.sample import (
     Picture,
     Sample,
 )
-from artgym.datasets.sample_files import PictureFolder
 from artgym.errors import InvalidArgumentError
 from artgym.files import MANIFEST_NAME, write_file_whole
 from artgym.geometry import transforms

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from artgym.datasets.sample_files import write_pictures
+from artgym.datasets.picture_files import write_pictures
 from artgym.errors import InvalidArgumentError
 from artgym.files import Manifest, ShardEntry
 from benchmarks import dataset_speed

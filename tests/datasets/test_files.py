@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 
 from artgym import files
-from artgym.datasets import sample_files
-from artgym.datasets.sample import PICTURE_ARRAYS, SAMPLE_ARRAYS, Picture
-from artgym.datasets.sample_files import (
+from artgym.datasets import picture_files
+from artgym.datasets.picture_files import (
     PictureFolder,
     SampleFolder,
     read_pictures,
     write_pictures,
 )
+from artgym.datasets.sample import PICTURE_ARRAYS, SAMPLE_ARRAYS, Picture
 from artgym.errors import DamagedFileError, FileNotWrittenError, InvalidArgumentError
 from artgym.files import (
     MANIFEST_NAME,
@@ -34,7 +34,7 @@ from artgym.files import (
     write_arrays,
     write_file_whole,
 )
-from tests.datasets.sample_factory import random_picture
+from tests.datasets.picture_factory import random_picture
 
 CONFIG = {"seed": 7, "camera": {"width": 32, "height": 24}, "categories": ["laptop"]}
 
@@ -122,7 +122,7 @@ class TestWholeFiles:
 class TestPictures:
     def test_every_field_has_a_declared_shape(self):
         names = {*PICTURE_ARRAYS, *SAMPLE_ARRAYS}
-        assert set(sample_files._SHAPES) == set(sample_files._DTYPES) == names
+        assert set(picture_files._SHAPES) == set(picture_files._DTYPES) == names
 
     @pytest.mark.parametrize(
         "sizes",

@@ -25,6 +25,7 @@ from artgym.datasets.generate import (
     make_pictures,
     make_scenes,
 )
+from artgym.datasets.picture_files import PictureFolder
 from artgym.datasets.sample import (
     AFFORDANCE_NO,
     AFFORDANCE_UNKNOWN,
@@ -33,7 +34,6 @@ from artgym.datasets.sample import (
     JOINT_PRISMATIC,
     JOINT_REVOLUTE,
 )
-from artgym.datasets.sample_files import PictureFolder
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import write_arrays
 from artgym.geometry import transforms

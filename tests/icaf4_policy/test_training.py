@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from artgym.datasets.sample_files import write_pictures
+from artgym.datasets.picture_files import write_pictures
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import Manifest, ShardEntry
 from icaf4_policy import cli
