@@ -16,12 +16,12 @@ from artgym.show.colors import piece_colors
 from artgym.sim import rays
 from artgym.sim.camera import View
 from artgym.sim.masks import NOTHING
+from artgym.sim.thumbnail import AZIMUTH, ELEVATION, seen_points
 
 Array = NDArray[np.floating]
 
-#: Where the camera looks from: azimuth from the object's front, height above the horizontal,
-#: radians; and its vertical field of view.
-_AZIMUTH, _ELEVATION, _FOV_Y = 0.6, 0.46, 0.5
+#: Vertical field of view, radians.
+_FOV_Y = 0.5
 #: Share of the picture's width and height that the object may fill.
 _FILL = 0.88
 #: Drawn so many times larger and averaged, against jagged edges.
@@ -38,15 +38,8 @@ _HIDDEN = 0.003
 
 def viewing_direction() -> Array:
     """Unit vector (3,) from an object towards the camera of its pictures, object frame."""
-    c = np.cos(_ELEVATION)
-    return np.array([c * np.cos(_AZIMUTH), c * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
-
-
-def seen_points(obj: ArticulatedObject, q: ArrayLike) -> Array:
-    """Corners (n, 3) of all that is seen of an object at joint positions, object frame."""
-    poses = obj.link_poses(np.asarray(q, dtype=float))
-    corners = [link_triangles(link)[0].reshape(-1, 3) for link in obj.links]
-    return np.concatenate([transforms.apply(T, c) for T, c in zip(poses, corners, strict=True)])
+    c = np.cos(ELEVATION)
+    return np.array([c * np.cos(AZIMUTH), c * np.sin(AZIMUTH), np.sin(ELEVATION)])
 
 
 def fitting_view(points_object: Array, size: tuple[int, int]) -> View:
@@ -116,7 +109,7 @@ def cast_picture(
     width, height = _OVERSAMPLING * view.width, _OVERSAMPLING * view.height
     K = intrinsics_from_fov(width, height, view.fov_y)
     T_camera_object = transforms.invert(view.T_world_camera)
-    corners = project(transforms.apply(T_camera_object, seen_points(obj, q)), K)
+    corners = project(transforms.apply(T_camera_object, seen_points(obj, np.asarray(q))), K)
     left, top = np.clip(np.floor(corners.min(axis=0)) - 1, 0, (width, height)).astype(int).tolist()
     right, bottom = np.clip(np.ceil(corners.max(axis=0)) + 1, 0, (width, height)).astype(int)
     part = slice(top, int(bottom)), slice(left, int(right))

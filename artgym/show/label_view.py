@@ -24,12 +24,13 @@ from artgym.geometry.grasps import APPROACH_RINGS, NUM_CANDIDATES, NUM_ROLLS
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject
 from artgym.show import colors
-from artgym.show.cast import CastPicture, cast_picture, fitting_view, seen_points, visible
+from artgym.show.cast import CastPicture, cast_picture, fitting_view, visible
 from artgym.show.grasp_choice import spread_grasps
 from artgym.show.object_view import joint_axis, joint_layers
 from artgym.show.page import Layer, Page, PageRamp, object_layers, solid_layer, start_eye
 from artgym.show.sheet import Overlay, Panel, Ramp, bar_chart, faded, sheet_png
 from artgym.show.solids import hand
+from artgym.sim.thumbnail import seen_points
 
 Array = NDArray[np.floating]
 

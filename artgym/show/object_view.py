@@ -15,11 +15,12 @@ from artgym.geometry import transforms
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject, Joint, canonical_box
 from artgym.show import colors
-from artgym.show.cast import cast_picture, fitting_view, seen_points
+from artgym.show.cast import cast_picture, fitting_view
 from artgym.show.page import Layer, Page, object_layers, solid_layer, start_eye
 from artgym.show.sheet import Legend, Overlay, Panel, faded, sheet_png
 from artgym.show.solids import arrow, box_edges
 from artgym.sim.camera import View
+from artgym.sim.thumbnail import seen_points
 
 Array = NDArray[np.floating]
 

@@ -18,7 +18,7 @@ Array = NDArray[np.floating]
 
 #: Where the camera looks from: azimuth from the object's front, height above the horizontal,
 #: radians.
-_AZIMUTH, _ELEVATION = 0.6, 0.46
+AZIMUTH, ELEVATION = 0.6, 0.46
 #: Vertical fields of view, radians: the first with which all of the object is near enough.
 _FOVS_Y = (0.5, 0.65, 0.85, 1.1)
 #: Share of the picture's half width and height that the object may fill.
@@ -48,7 +48,7 @@ def thumbnail(
     """
     q = np.array([joint.position(open_fraction) for joint in obj.joints])
     width, height = (_OVERSAMPLING * pixels for pixels in size)
-    points = _points(obj, q)
+    points = seen_points(obj, q)
     for fov_y in _FOVS_Y:
         view = _framing(points, fov_y, width, height)
         if transforms.apply(transforms.invert(view.T_world_camera), points)[:, 2].max() < FAR:
@@ -68,8 +68,8 @@ def thumbnail(
     return blocks.mean(axis=(1, 3)).round().astype(np.uint8)
 
 
-def _points(obj: ArticulatedObject, q: Array) -> Array:
-    """Corners (n, 3) of all that is seen of the object at q, object frame."""
+def seen_points(obj: ArticulatedObject, q: Array) -> Array:
+    """Corners (n, 3) of all that is seen of an object at q, object frame."""
     return np.concatenate(
         [
             transforms.apply(T, link_triangles(link)[0].reshape(-1, 3))
@@ -82,9 +82,9 @@ def _framing(points: Array, fov_y: float, width: int, height: int) -> View:
     """The camera whose picture the points (n, 3) just fill."""
     direction = np.array(
         [
-            np.cos(_ELEVATION) * np.cos(_AZIMUTH),
-            np.cos(_ELEVATION) * np.sin(_AZIMUTH),
-            np.sin(_ELEVATION),
+            np.cos(ELEVATION) * np.cos(AZIMUTH),
+            np.cos(ELEVATION) * np.sin(AZIMUTH),
+            np.sin(ELEVATION),
         ]
     )
     target = (points.min(axis=0) + points.max(axis=0)) / 2
