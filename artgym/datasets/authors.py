@@ -186,7 +186,7 @@ def _arrays(file: h5py.File) -> dict[str, NDArray[Any]]:
                 sizes[symbol] = size
         if item.chunks and math.prod(item.chunks) * item.dtype.itemsize > _MAX_CHUNK_BYTES:
             raise DamagedFileError(f"{name} claims chunks of shape {item.chunks}")
-        arrays[name] = dataset_array(name, item)
+        arrays[name] = dataset_array(name, item.id)
     return arrays
 
 

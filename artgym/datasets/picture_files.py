@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, TypeVar, cast, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import h5py
 import numpy as np
@@ -36,8 +36,9 @@ from artgym.geometry.grasps import NUM_CANDIDATES
 
 PICTURES_FORMAT = "artgym-pictures"
 
-#: gzip level: pictures are many and written once each.
-_LEVEL = 1
+#: gzip level of a picture's arrays, which are many and written once each; those of its samples are
+#: smaller, and read again and again.
+_LEVEL, _SAMPLE_LEVEL = 1, 0
 
 #: Shapes of arrays; equal letters are equal sizes within one sample, or one picture.
 _SHAPES: dict[str, tuple[int | str, ...]] = {
@@ -96,24 +97,26 @@ def write_pictures(path: str | os.PathLike[str], pictures: Sequence[Picture]) ->
         FileNotWrittenError: the system refused.
     """
 
-    def put(group: h5py.Group, value: Picture | Sample, names: Sequence[str], what: str) -> None:
+    def put(
+        group: h5py.Group, value: Picture | Sample, names: Sequence[str], what: str, level: int
+    ) -> None:
         arrays = {name: np.asarray(getattr(value, name)) for name in names}
         if misfit := _misfit(arrays):
             raise InvalidArgumentError(f"{what} cannot be written to {path}: {misfit}.")
         for name, array in arrays.items():
-            put_array(group, name, array, level=_LEVEL)
+            put_array(group, name, array, level=level)
 
     def fill(file: h5py.File) -> None:
         counts = np.array([len(picture.samples) for picture in pictures], dtype=np.int32)
         put_array(file, _COUNTS, counts, level=_LEVEL)
         for i, picture in enumerate(pictures):
             group = file.create_group(_picture_name(i))
-            put(group, picture, PICTURE_ARRAYS, f"picture {i}")
+            put(group, picture, PICTURE_ARRAYS, f"picture {i}", _LEVEL)
             for k, sample in enumerate(picture.samples):
                 subgroup = group.create_group(_object_name(k))
                 put_text(subgroup, "object_id", sample.object_id)
                 what = f"sample {k} of picture {i} ({sample.object_id})"
-                put(subgroup, sample, SAMPLE_ARRAYS, what)
+                put(subgroup, sample, SAMPLE_ARRAYS, what, _SAMPLE_LEVEL)
 
     write_file_whole(path, hdf5_image(PICTURES_FORMAT, fill))
 
@@ -176,14 +179,20 @@ def _arrays(group: h5py.Group, names: Sequence[str], what: str) -> dict[str, NDA
     arrays = {}
     for name in names:
         # A soft or external link could lead anywhere.
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        if not _is_hard_link(group, name):
             raise DamagedFileError(f"{what} has no array {name!r}")
-        arrays[name] = dataset_array(name, cast(h5py.Dataset, group[name]))
+        arrays[name] = dataset_array(name, h5py.h5d.open(group.id, name.encode()))
     return arrays
 
 
+def _is_hard_link(group: h5py.Group, name: str) -> bool:
+    links, key = group.id.links, name.encode()
+    hard = h5py.h5l.TYPE_HARD  # pyright: ignore[reportAttributeAccessIssue]
+    return bool(links.exists(key) and links.get_info(key).type == hard)
+
+
 def _subgroup(group: h5py.Group, name: str) -> h5py.Group:
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+    if not _is_hard_link(group, name):
         raise DamagedFileError(f"there is no group {name!r} in {group.name!r}")
     found = group[name]
     if not isinstance(found, h5py.Group):
