@@ -22,7 +22,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from benchmarks import record
 from benchmarks.command import run
-from icaf4_policy.anchors import axis_anchors
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.dataset import EpochSampler, TrainingItems
 from icaf4_policy.targets import DrawConfig, collate_items
 
@@ -92,7 +92,7 @@ def measure(config: DatasetSpeedConfig) -> dict[str, Any]:
 
 def _item_rates(folder: Path, epochs: int) -> list[float]:
     """Training items a second in each epoch, from one worker of a data loader."""
-    anchors = axis_anchors(45)
+    anchors = anchors_from_config(AnchorConfig())
     draw = DrawConfig(num_points=_NUM_POINTS, num_anchors=len(anchors), color_jitter=0.2)
     items = TrainingItems(SampleFolder(folder), anchors, draw)
     loader = DataLoader(

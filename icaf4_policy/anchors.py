@@ -5,7 +5,9 @@ Anchors live in the level frame: z up, x in the viewing direction.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import (
     JAW_SYMMETRY,
+    axis_angle_from_matrix,
     frame_from_z,
     grasp_angle,
+    matrix_from_axis_angle,
     matrix_from_quaternion,
     quaternion_from_matrix,
 )
@@ -61,40 +65,125 @@ def axis_anchors(step_deg: int = 45) -> Array:
     return anchors
 
 
-def _nearest_variants(R_grasps: Array, anchors: Array) -> tuple[Array, Array, Array]:
-    """Quaternions of grasps (n, 3, 3) and of anchors (L, 3, 3), and how they agree.
+#: The real root of ``x**3 = x + 1``: multiples of its inverse, and of the square of the inverse,
+#: fill a square evenly.
+_PLASTIC = 1.324717957244746
 
-    Returns:
-        Quaternions (2, n, 4) of the grasps and of their jaw-swapped twins, those of the anchors
-        (L, 4), and the dot products (2, n, L).
+
+@cache
+def so3_anchors(count: int) -> Array:
+    """Anchor rotations (L, 3, 3) spread evenly over all grasps, ``count`` of them.
+
+    Super-Fibonacci spirals (Alexa, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of
+    SO(3)", CVPR 2022) write a unit quaternion as two complex numbers and step along their phases.
+    Here these are (w, z) and (x, y), which half a turn about z and the quaternion's sign move by
+    (pi/2, -pi/2) and (pi, pi): steps within that cell meet each grasp once, its jaw-swapped twin
+    left out. A random grasp is 22.7 degrees from the nearest of 72 on average; of the spirals' own
+    72, blind to the jaws, it is 24.3.
     """
-    q_grasps = quaternion_from_matrix(np.stack([R_grasps, R_grasps @ JAW_SYMMETRY]))
-    q_anchors = quaternion_from_matrix(anchors)
-    return q_grasps, q_anchors, q_grasps @ q_anchors.T
+    if count < 1:
+        raise InvalidArgumentError(f"count={count} must be at least 1.")
+    index = np.arange(count) + 0.5
+    share = index / count
+    halfturn, sign = index / _PLASTIC, index / _PLASTIC**2
+    phase_wz, phase_xy = np.pi * (sign + halfturn / 2), np.pi * (sign - halfturn / 2)
+    w_z, x_y = np.sqrt(share), np.sqrt(1.0 - share)
+    q = np.stack(
+        [
+            w_z * np.cos(phase_wz),
+            x_y * np.cos(phase_xy),
+            x_y * np.sin(phase_xy),
+            w_z * np.sin(phase_wz),
+        ],
+        axis=-1,
+    )
+    anchors = matrix_from_quaternion(q)
+    anchors.setflags(write=False)
+    return anchors
 
 
-def match_anchors(R_grasps: ArrayLike, anchors: Array) -> tuple[NDArray[np.int64], Array]:
-    """The anchor nearest to each grasp, and the residual from it (Eqs. 2 and 4).
+@dataclass(frozen=True, kw_only=True)
+class AnchorConfig:
+    """Which anchors, and how a residual is written.
 
-    Distance is the geodesic angle, minimum over the jaw symmetry. The residual is ``q - A``, with
-    q that of the four equal grasps (sign of the quaternion, jaws swapped) nearest to A.
-
-    Args:
-        R_grasps: (n, 3, 3), same frame as the anchors.
-        anchors: (L, 3, 3).
-
-    Returns:
-        Anchor indices (n,) and residuals (n, 4), wxyz.
+    Attributes:
+        kind: "axis" anchors are the paper's (``axis_anchors``), their residual the difference of
+            quaternions of Eq. 4; "so3" anchors fill all rotations (``so3_anchors``), their
+            residual is the rotation vector from the anchor in the anchor's own frame; "direct"
+            has no anchors but regresses one quaternion a point, as a baseline.
+        step_deg: of axis anchors.
+        count: of so3 anchors.
     """
-    q_grasps, q_anchors, dots = _nearest_variants(np.asarray(R_grasps, dtype=float), anchors)
-    matched = np.argmax(np.max(np.abs(dots), axis=0), axis=-1)  # (n,)
-    row = np.arange(len(matched))
-    dot = dots[:, row, matched]  # (2, n)
-    variant = np.argmax(np.abs(dot), axis=0)
-    q = q_grasps[variant, row] * np.where(dot[variant, row] < 0, -1.0, 1.0)[:, None]
-    return matched, q - q_anchors[matched]
+
+    kind: Literal["axis", "so3", "direct"] = "axis"
+    step_deg: int = 45
+    count: int = 72
+
+    def __post_init__(self) -> None:
+        anchors_from_config(self)
 
 
-def grasps_from_residuals(anchors: ArrayLike, residuals: ArrayLike) -> Array:
-    """Grasps (..., 3, 3): anchors (..., 3, 3) plus residuals (..., 4), normalised (Eq. 4)."""
-    return matrix_from_quaternion(quaternion_from_matrix(anchors) + np.asarray(residuals))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Anchors:
+    """L anchors; r numbers make a residual.
+
+    Attributes:
+        kind: of ``AnchorConfig``.
+        rotations: (L, 3, 3), level frame; the unit rotation alone for "direct".
+    """
+
+    kind: Literal["axis", "so3", "direct"]
+    rotations: Array
+
+    def __len__(self) -> int:
+        """L."""
+        return len(self.rotations)
+
+    @property
+    def residual_size(self) -> int:
+        """R."""
+        return 3 if self.kind == "so3" else 4
+
+    def match(self, R_level_grasps: ArrayLike) -> tuple[NDArray[np.int64], Array]:
+        """The anchor nearest to each grasp, and the residual from it (Eqs. 2 and 4).
+
+        Distance is the geodesic angle, minimum over the jaw symmetry. The residual starts from
+        that of the equal grasps (sign of the quaternion, jaws swapped) nearest to the anchor.
+
+        Args:
+            R_level_grasps: (n, 3, 3).
+
+        Returns:
+            Anchor indices (n,) and residuals (n, r).
+        """
+        R = np.asarray(R_level_grasps, dtype=float)
+        variants = np.stack([R, R @ JAW_SYMMETRY])
+        q_grasps = quaternion_from_matrix(variants)  # (2, n, 4)
+        q_anchors = quaternion_from_matrix(self.rotations)
+        dots = q_grasps @ q_anchors.T  # (2, n, L)
+        matched = np.argmax(np.max(np.abs(dots), axis=0), axis=-1)  # (n,)
+        row = np.arange(len(matched))
+        dot = dots[:, row, matched]  # (2, n)
+        variant = np.argmax(np.abs(dot), axis=0)
+        if self.kind == "so3":
+            R_anchor_level = np.swapaxes(self.rotations[matched], -1, -2)
+            return matched, axis_angle_from_matrix(R_anchor_level @ variants[variant, row])
+        q = q_grasps[variant, row] * np.where(dot[variant, row] < 0, -1.0, 1.0)[:, None]
+        return matched, q - q_anchors[matched]
+
+    def grasps(self, index: ArrayLike, residuals: ArrayLike) -> Array:
+        """Grasps (..., 3, 3), level frame: anchors at ``index`` (...) and residuals (..., r)."""
+        anchors, residuals = self.rotations[np.asarray(index)], np.asarray(residuals, dtype=float)
+        if self.kind == "so3":
+            return anchors @ matrix_from_axis_angle(residuals)
+        return matrix_from_quaternion(quaternion_from_matrix(anchors) + residuals)
+
+
+@cache
+def anchors_from_config(config: AnchorConfig) -> Anchors:
+    """The anchors that a config asks for."""
+    if config.kind == "direct":
+        return Anchors(kind="direct", rotations=np.eye(3)[None])
+    axis = config.kind == "axis"
+    rotations = axis_anchors(config.step_deg) if axis else so3_anchors(config.count)
+    return Anchors(kind=config.kind, rotations=rotations)

@@ -16,6 +16,7 @@ from torch import Tensor
 
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import write_file_whole
+from icaf4_policy.anchors import AnchorConfig
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.model import Icaf4, ModelConfig
 
@@ -95,7 +96,11 @@ def _config_from_json(fields: dict[str, Any]) -> ModelConfig:
     backbone: dict[str, Any] = {
         k: tuple(v) if isinstance(v, list) else v for k, v in fields["backbone"].items()
     }
-    return ModelConfig(**{**fields, "backbone": BackboneConfig(**backbone)})
+    parts = {
+        "anchors": AnchorConfig(**fields["anchors"]),
+        "backbone": BackboneConfig(**backbone),
+    }
+    return ModelConfig(**{**fields, **parts})
 
 
 def load_model(weights: Path) -> tuple[Icaf4, dict[str, Any]]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from torch.utils.data import Dataset, Sampler
 
 from artgym.datasets.sample import Sample
+from icaf4_policy.anchors import Anchors
 from icaf4_policy.targets import DrawConfig, Item, Targets, draw_item, targets_from_sample
 
 #: Of a sample's points, at most this many times ``num_points`` are kept to draw from.
@@ -37,7 +37,7 @@ class TrainingItems(Dataset[Item]):
 
     Args:
         samples: such as a ``SampleFolder``, which is read lazily.
-        anchors: (L, 3, 3), level frame.
+        anchors: what successful grasps are matched with.
         config: how points are chosen.
         seed: of the choice.
     """
@@ -45,7 +45,7 @@ class TrainingItems(Dataset[Item]):
     def __init__(
         self,
         samples: Sequence[Sample],
-        anchors: NDArray[np.floating],
+        anchors: Anchors,
         config: DrawConfig,
         *,
         seed: int = 0,

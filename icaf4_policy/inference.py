@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
-from icaf4_policy.anchors import axis_anchors, grasps_from_residuals
+from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.model import Icaf4, Outputs
@@ -223,11 +223,11 @@ class Perception:
         outputs, points, pick = self._look(
             points_camera, colors, R_level_camera, rng, self.model.config.num_points
         )
-        anchors = axis_anchors(self.model.config.anchor_step_deg)
+        anchors = anchors_from_config(self.model.config.anchors)
         order = outputs.grasp_points[0].argsort()
         scores, best = outputs.anchors[0, order].sigmoid().topk(min(top, len(anchors)), dim=-1)
         residuals = outputs.residuals[0, order].take_along_dim(best[..., None], dim=1)
-        R_level_grasp = grasps_from_residuals(anchors[best.numpy()], residuals.numpy())
+        R_level_grasp = anchors.grasps(best.numpy(), residuals.numpy())
         return PointGrasps(
             points_camera=points,
             point_index=pick,
@@ -327,7 +327,7 @@ class Perception:
     ) -> Grasps:
         """Scores every (point, anchor) pair and keeps the best that differ."""
         asked = outputs.grasp_points[0].numpy()  # (S,)
-        anchors = axis_anchors(self.model.config.anchor_step_deg)
+        anchors = anchors_from_config(self.model.config.anchors)
         scores = affordance[asked, None] * outputs.anchors[0].sigmoid().numpy()  # (S, L)
         # Some tens of candidates for each proposal leave enough after thinning.
         wanted = min(32 * self.proposals.count, scores.size)
@@ -335,7 +335,7 @@ class Perception:
         keep = keep[np.argsort(-scores.flat[keep], kind="stable")]
         row, anchor = np.unravel_index(keep, scores.shape)
         residuals = outputs.residuals[0].numpy()[row, anchor]
-        R_grasps = R_level_camera.T @ grasps_from_residuals(anchors[anchor], residuals)
+        R_grasps = R_level_camera.T @ anchors.grasps(anchor, residuals)
         chosen = diverse(points[asked[row]], R_grasps, self.proposals)
         source = asked[row[chosen]]
         return Grasps(

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from artgym.errors import InvalidArgumentError
-from icaf4_policy.anchors import axis_anchors
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.backbone.pointnet2 import BackboneConfig, PointNet2
 from icaf4_policy.heads.affordance import AffordanceHead
 from icaf4_policy.heads.grasp import GraspHead
@@ -26,7 +26,7 @@ class ModelConfig:
         num_parts: K, the base included.
         length_unit: metres of one network unit; half the size of a typical object.
         num_points: points of a cloud.
-        anchor_step_deg: step between anchors, degrees.
+        anchors: what grasps are refined from.
         backbone: sizes of the backbone.
     """
 
@@ -34,7 +34,7 @@ class ModelConfig:
     num_parts: int
     length_unit: float
     num_points: int = 2048
-    anchor_step_deg: int = 45
+    anchors: AnchorConfig = field(default_factory=AnchorConfig)
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
 
     def __post_init__(self) -> None:
@@ -51,7 +51,9 @@ class ModelConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
-    """What the heads say. B clouds, N points, K parts, S points asked for grasps, L anchors.
+    """What the heads say.
+
+    B clouds, N points, K parts, S points asked for grasps, L anchors with residuals of r numbers.
 
     Attributes:
         segmentation: logits (B, N, K).
@@ -62,7 +64,7 @@ class Outputs:
         joint_offset: (B, N, 3), network units, level frame: point to nearest point of the axis.
         grasp_points: int64 (B, S), the points that the two below are about.
         anchors: logits (B, S, L).
-        residuals: (B, S, L, 4), wxyz.
+        residuals: (B, S, L, r), see ``Anchors``.
     """
 
     segmentation: Tensor
@@ -89,7 +91,8 @@ class Icaf4(nn.Module):
         self.nocs = NocsHead(channels, config.num_parts)
         self.affordance = AffordanceHead(channels)
         self.joint = JointHead(channels)
-        self.grasp = GraspHead(channels, len(axis_anchors(config.anchor_step_deg)))
+        anchors = anchors_from_config(config.anchors)
+        self.grasp = GraspHead(channels, len(anchors), anchors.residual_size)
 
     def forward(
         self, points_level: Tensor, colors: Tensor, grasp_points: Tensor | int | None = None

@@ -17,7 +17,8 @@ from artgym.datasets.sample import (
     JOINT_REVOLUTE,
     Sample,
 )
-from icaf4_policy.anchors import match_anchors
+from artgym.geometry.rotations import grasp_angle
+from icaf4_policy.anchors import Anchors
 from icaf4_policy.cloud import choose_points, level_points
 
 
@@ -37,7 +38,7 @@ class Targets:
         match_start: int32 (G + 1,): the matches of labelled point g are
             ``match_start[g]:match_start[g + 1]`` of the next two.
         match_anchor: int16 (n,), matched anchors (the mask M of Eq. 3, sparse).
-        match_residual: float16 (n, 4), from the anchor to its nearest successful grasp (Eq. 4).
+        match_residual: float16 (n, r), from the anchor to its nearest successful grasp (Eq. 4).
     """
 
     points_level: NDArray[np.float32]
@@ -66,12 +67,21 @@ def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.flo
     return row, R_level_object @ sample.tried_rotations()[row, attempt]
 
 
-def targets_from_sample(sample: Sample, anchors: NDArray[np.floating], max_points: int) -> Targets:
+def _mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Mean angle (n,) from each grasp (n, 3, 3) to the others of its point, ``row`` ascending."""
+    angles = np.empty(len(row))
+    for group in np.split(np.arange(len(row)), np.flatnonzero(np.diff(row)) + 1):
+        here = R_grasps[group]
+        angles[group] = grasp_angle(here[:, None], here[None]).mean(axis=1)
+    return angles
+
+
+def targets_from_sample(sample: Sample, anchors: Anchors, max_points: int) -> Targets:
     """Works out the targets of a sample.
 
     Args:
         sample: one view.
-        anchors: (L, 3, 3), level frame.
+        anchors: what successful grasps are matched with.
         max_points: of a longer cloud, this many points are kept, evenly in their order.
     """
     points_level, center_level = level_points(sample.points_camera, sample.R_level_camera)
@@ -80,9 +90,14 @@ def targets_from_sample(sample: Sample, anchors: NDArray[np.floating], max_point
     R_level_camera = sample.R_level_camera.astype(float)
 
     row, R_level_grasp = successful_grasps(sample)
-    matched, residual = match_anchors(R_level_grasp, anchors)
-    # Of the grasps of one point that share an anchor, the nearest to it gives the residual.
-    order = np.lexsort((np.sum(residual**2, axis=-1), matched, row))
+    matched, residual = anchors.match(R_level_grasp)
+    # Of the grasps of one point that share an anchor, the nearest to it gives the residual; where
+    # one must speak for all, it is the most central.
+    if anchors.kind == "direct":
+        rank = _mean_angles(row, R_level_grasp)
+    else:
+        rank = np.sum(residual**2, axis=-1)
+    order = np.lexsort((rank, matched, row))
     row, matched, residual = row[order], matched[order], residual[order]
     first = np.ones(len(row), dtype=bool)
     first[1:] = (np.diff(row) != 0) | (np.diff(matched) != 0)
@@ -124,7 +139,7 @@ class Batch:
             have none, 0 at fillers.
         anchor_mask: float32 (B, S, L), the multi-hot mask of Eq. 3.
         match_index: int64 (n,), where the mask is one, counted through (B, S, L).
-        match_residual: float32 (n, 4), the residuals there.
+        match_residual: float32 (n, r), the residuals there.
     """
 
     points_level: Tensor

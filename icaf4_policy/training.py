@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from artgym.datasets.sample import Sample
 from artgym.errors import DamagedFileError, InvalidArgumentError
-from icaf4_policy.anchors import axis_anchors
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.checkpoint import load_tensors, save_model, save_tensors
 from icaf4_policy.dataset import SPARE_POINTS
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
@@ -53,7 +53,7 @@ class TrainingConfig:
         gradient_limit: the norm that gradients are clipped to.
         num_points: points of a cloud.
         num_grasp_points: points of a cloud whose grasps are learnt in a step.
-        anchor_step_deg: step between anchors, degrees.
+        anchors: what grasps are refined from.
         precision: of the products while training; "bfloat16" is a quarter faster where the
             processor has it, and predictions and coordinates stay in float32 all the same.
         color_jitter: spread of the random change of colours.
@@ -74,7 +74,7 @@ class TrainingConfig:
     gradient_limit: float = 10.0
     num_points: int = 2048
     num_grasp_points: int = 384
-    anchor_step_deg: int = 45
+    anchors: AnchorConfig = field(default_factory=AnchorConfig)
     precision: Literal["float32", "bfloat16"] = "bfloat16"
     color_jitter: float = 0.2
     validate_every: int = 2
@@ -127,7 +127,7 @@ def prepare(
     Raises:
         InvalidArgumentError: a sample of another category.
     """
-    anchors = axis_anchors(config.anchor_step_deg)
+    anchors = anchors_from_config(config.anchors)
     digest = hashlib.sha256()
     prepared = []
     for sample in tqdm(samples, desc=label, unit="sample", leave=False, disable=None):
@@ -151,7 +151,7 @@ def _model_config(config: TrainingConfig, targets: Sequence[Targets]) -> ModelCo
         num_parts=max(len(t.joint_type) for t in targets),
         length_unit=round(float(np.median(diagonals)) / 2.0, 3),
         num_points=config.num_points,
-        anchor_step_deg=config.anchor_step_deg,
+        anchors=config.anchors,
     )
 
 
@@ -317,13 +317,13 @@ def train(
 
     draw = DrawConfig(
         num_points=config.num_points,
-        num_anchors=model.grasp.num_anchors,
+        num_anchors=model.grasp.shape[0],
         num_grasp_points=config.num_grasp_points,
         color_jitter=config.color_jitter,
     )
     draw_plain = DrawConfig(
         num_points=config.num_points,
-        num_anchors=model.grasp.num_anchors,
+        num_anchors=model.grasp.shape[0],
         num_grasp_points=config.num_grasp_points,
     )
     last = config.epochs if stop_after_epoch is None else min(stop_after_epoch, config.epochs)

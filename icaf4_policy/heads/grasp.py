@@ -8,15 +8,16 @@ from icaf4_policy.heads.mlp import PointMLP
 
 
 class GraspHead(nn.Module):
-    """5 L channels: L anchor logits and L quaternion residuals."""
+    """(1 + r) L channels: L anchor logits and L residuals of r numbers."""
 
-    def __init__(self, in_channels: int, num_anchors: int) -> None:
+    def __init__(self, in_channels: int, num_anchors: int, residual_size: int) -> None:
         super().__init__()
-        self.num_anchors = num_anchors
-        self.mlp = PointMLP(in_channels, 128, 5 * num_anchors)
+        self.shape = num_anchors, residual_size
+        self.mlp = PointMLP(in_channels, 128, num_anchors * (1 + residual_size))
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (B, S, L) and residuals (B, S, L, 4), wxyz, from features (B, S, C)."""
+        """Logits (B, S, L) and residuals (B, S, L, r) from features (B, S, C)."""
+        num_anchors, residual_size = self.shape
         channels = self.mlp(features)
-        logits, residuals = channels.split((self.num_anchors, 4 * self.num_anchors), dim=-1)
-        return logits, residuals.unflatten(-1, (self.num_anchors, 4))
+        logits, residuals = channels.split((num_anchors, residual_size * num_anchors), dim=-1)
+        return logits, residuals.unflatten(-1, self.shape)

@@ -9,12 +9,12 @@ import pytest
 import torch
 from torch.utils.data import DataLoader
 
-from icaf4_policy.anchors import axis_anchors
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.dataset import EpochSampler, TrainingItems
 from icaf4_policy.targets import DrawConfig, collate_items
 from tests.icaf4_policy.toy import toy_sample
 
-ANCHORS = axis_anchors(45)
+ANCHORS = anchors_from_config(AnchorConfig())
 DRAW = DrawConfig(num_points=128, num_anchors=len(ANCHORS), num_grasp_points=32, color_jitter=0.2)
 
 

@@ -7,7 +7,7 @@ from torch.nn import functional as F
 
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
-from icaf4_policy.anchors import axis_anchors, grasps_from_residuals
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Outputs
 from icaf4_policy.targets import (
@@ -23,17 +23,19 @@ UNIT = 0.25
 SURE = 50.0
 
 
-@pytest.fixture
-def batch():
-    targets = [targets_from_sample(toy_sample(i), axis_anchors(45), 512) for i in range(2)]
-    draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
+@pytest.fixture(params=["axis", "so3", "direct"])
+def batch(request):
+    anchors = anchors_from_config(AnchorConfig(kind=request.param))
+    targets = [targets_from_sample(toy_sample(i), anchors, 512) for i in range(2)]
+    draw = DrawConfig(num_points=256, num_anchors=len(anchors), num_grasp_points=48)
     items = [draw_item(t, draw, np.random.default_rng(i)) for i, t in enumerate(targets)]
     return collate_items(items, draw)
 
 
 def truthful_outputs(batch):
-    residuals = torch.zeros(*batch.anchor_mask.shape, 4)
-    residuals.view(-1, 4)[batch.match_index] = batch.match_residual
+    size = batch.match_residual.shape[-1]
+    residuals = torch.zeros(*batch.anchor_mask.shape, size)
+    residuals.view(-1, size)[batch.match_index] = batch.match_residual
     sure = {
         name: SURE * F.one_hot(getattr(batch, name).clamp(max=limit), limit + 1).float()
         for name, limit in (("part", 1), ("affordance", 1), ("joint_type", 2))
@@ -98,9 +100,10 @@ def test_other_parts_channels_and_unmatched_residuals_are_free(batch):
     assert total_loss(loss_terms(free, batch, UNIT), LossWeights()) < 1e-5
 
 
-def test_targets_give_back_successful_grasps(batch):
+@pytest.mark.parametrize("kind", ["axis", "so3"])
+def test_targets_give_back_successful_grasps(kind):
     sample = toy_sample(0)
-    anchors = axis_anchors(45)
+    anchors = anchors_from_config(AnchorConfig(kind=kind))
     row, R_level_grasp = successful_grasps(sample)
     targets = targets_from_sample(sample, anchors, 512)
     for g in range(len(sample.grasp_part)):
@@ -110,11 +113,24 @@ def test_targets_give_back_successful_grasps(batch):
         if not (row == g).any():
             assert len(matched) == 0
             continue
-        rebuilt = grasps_from_residuals(anchors[matched], targets.match_residual[block])
+        rebuilt = anchors.grasps(matched, targets.match_residual[block])
         distances = grasp_angle(rebuilt[:, None], R_level_grasp[row == g][None])
         assert distances.min(axis=1).max() < 0.005
-        nearest = grasp_angle(R_level_grasp[row == g][:, None], anchors[None]).argmin(axis=1)
-        assert set(nearest) == set(matched)
+        angles = grasp_angle(R_level_grasp[row == g][:, None], anchors.rotations[None])
+        assert set(angles.argmin(axis=1)) == set(matched)
+
+
+def test_direct_target_is_the_most_central_success():
+    sample = toy_sample(0)
+    anchors = anchors_from_config(AnchorConfig(kind="direct"))
+    row, R_level_grasp = successful_grasps(sample)
+    targets = targets_from_sample(sample, anchors, 512)
+    for g in np.unique(row):
+        here = R_level_grasp[row == g]
+        assert targets.match_start[g + 1] - targets.match_start[g] == 1
+        kept = anchors.grasps(0, targets.match_residual[targets.match_start[g]])
+        means = grasp_angle(here[:, None], here[None]).mean(axis=1)
+        assert grasp_angle(kept[None], here).mean() < means.min() + 0.01
 
 
 def test_joint_offsets_lead_to_the_axis(batch):
@@ -140,7 +156,7 @@ def test_a_sample_without_any_success_can_be_trained_on():
         grasp_row=np.full_like(sample.grasp_row, -1),
     )
     draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
-    targets = targets_from_sample(hopeless, axis_anchors(45), 512)
+    targets = targets_from_sample(hopeless, anchors_from_config(AnchorConfig()), 512)
     batch = collate_items([draw_item(targets, draw, np.random.default_rng(0))], draw)
     terms = loss_terms(truthful_outputs(batch), batch, UNIT)
     assert total_loss(terms, LossWeights()).item() == pytest.approx(0.0, abs=1e-5)

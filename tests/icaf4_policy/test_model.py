@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from artgym.errors import InvalidArgumentError
-from icaf4_policy.anchors import axis_anchors
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig
@@ -23,7 +23,10 @@ DRAW = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
 
 
 def toy_batch(count=2):
-    targets = [targets_from_sample(toy_sample(i), axis_anchors(45), 512) for i in range(count)]
+    targets = [
+        targets_from_sample(toy_sample(i), anchors_from_config(AnchorConfig()), 512)
+        for i in range(count)
+    ]
     items = [draw_item(t, DRAW, np.random.default_rng(i)) for i, t in enumerate(targets)]
     return collate_items(items, DRAW)
 
@@ -54,6 +57,14 @@ def test_shapes(network):
         "anchors": (2, 48, 72),
         "residuals": (2, 48, 72, 4),
     }
+
+
+@pytest.mark.parametrize(("kind", "shape"), [("so3", (72, 3)), ("direct", (1, 4))])
+def test_residuals_are_those_of_the_anchors(kind, shape):
+    network = Icaf4(dataclasses.replace(SMALL, anchors=AnchorConfig(kind=kind)))
+    batch = toy_batch()
+    outputs = network(batch.points_level, batch.colors, batch.grasp_points)
+    assert outputs.residuals.shape == (2, 48, *shape)
 
 
 @torch.no_grad()
