@@ -1,6 +1,7 @@
 """Is a run of shards ever harmed by what happens to it? `python -m benchmarks.faults`.
 
-One command makes shards of arrays, with each engine and number of workers. First nothing happens
+One command makes shards, with each engine and number of workers: of random numbers, or small ones
+of labels or of pictures as `artgym annotate` and `artgym generate` make them. First nothing happens
 to it. Then the whole command is killed at random moments and started again, until it is done.
 Then its workers are killed, stopped, crash or loop for ever. Each time the bytes are compared with
 those of one process that nothing happened to, and processes that stay behind are counted.
@@ -35,15 +36,22 @@ from numpy.typing import NDArray
 from rich.table import Table
 from tqdm import tqdm
 
+from artgym.datasets.picture_files import read_pictures, write_pictures
+from artgym.datasets.sample import Picture
 from artgym.errors import ArtgymError, InvalidArgumentError, MissingDependencyError
-from artgym.files import MANIFEST_NAME, Manifest, read_arrays
+from artgym.files import MANIFEST_NAME, Manifest, read_arrays, write_arrays
 from artgym.jobs import ShardsFailedError, ShardTask, run_shards
+from artgym.objects import catalog
 from benchmarks import record
 from benchmarks.command import run
 
 Engine = Literal["loky", "dask", "ray"]
+Work = Literal["numbers", "labels", "pictures"]
 #: What the engines are installed as, and imported as.
 _ENGINE_PACKAGES = {"loky": "joblib", "dask": "distributed", "ray": "ray"}
+
+#: The category that labels and pictures are of.
+_CATEGORY = "laptop"
 
 #: What happens to a worker.
 FAULTS = ("killed", "stopped", "segfault", "endless loop")
@@ -68,18 +76,20 @@ class FaultsConfig:
     """What is done to whom.
 
     Attributes:
+        work: what the shards hold; a worker takes seconds to start where it is no random numbers.
         engines: engines.
         workers: worker processes; with loky, 1 works in the command's own process, and has no
             worker that could fail.
         kills: how many times the whole command is killed, over all engines and workers.
         faults: how many workers fail, of each kind in turn.
-        shards: how many the command makes.
+        shards: how many the command makes, at most 30 of pictures.
         draws: random numbers of a shard, in millions; 8 take about 0.1 s.
         timeout: seconds that a shard may take.
         seed: of the moments, and of the shards that fail.
-        out: folder for ``faults.json``.
+        out: folder for ``faults.json``, or ``faults_labels.json``, ``faults_pictures.json``.
     """
 
+    work: Work = "numbers"
     engines: tuple[Engine, ...] = ("loky", "dask", "ray")
     workers: tuple[int, ...] = (1, 2, 4)
     kills: int = 50
@@ -118,13 +128,15 @@ class Shard:
     """What determines a shard, and what happens to the first worker that makes it.
 
     Attributes:
-        seed: of its numbers.
+        work: what it holds.
+        seed: of its numbers, or which of the labelled objects it is about.
         draws: how many numbers, in millions.
         fault: one of ``FAULTS``, or none.
         delay: seconds from its start to the fault.
         scar: a file that exists once the fault has come.
     """
 
+    work: Work
     seed: int
     draws: int
     fault: str | None = None
@@ -132,17 +144,39 @@ class Shard:
     scar: str = ""
 
 
-def make_shard(shard: Shard) -> dict[str, NDArray[Any]]:
-    """Moments of random numbers, and some of them."""
+def make_shard(shard: Shard) -> dict[str, NDArray[Any]] | list[Picture]:
+    """Labels or pictures of an object, or moments of random numbers and some of them."""
     if shard.fault is not None and not Path(shard.scar).exists():
         Path(shard.scar).touch()
         if shard.fault == "endless loop":
             _fail(shard.fault)
         threading.Timer(shard.delay, _fail, [shard.fault]).start()
+    if shard.work != "numbers":
+        return _labels(shard.seed) if shard.work == "labels" else _pictures(shard.seed)
     rng = np.random.default_rng(shard.seed)
     values = [rng.normal(size=1_000_000) for _ in range(shard.draws)]
     means = np.array([each.mean() for each in values])
     return {"means": means, "values": values[-1][:4000], "seed": np.array(shard.seed)}
+
+
+def _labels(number: int) -> dict[str, NDArray[Any]]:
+    """Labels of few points of an object."""
+    # The simulator takes a second to import, which shards of numbers need not wait for.
+    from artgym.annotation.annotate import AnnotationConfig, annotate
+
+    config = AnnotationConfig(
+        start_states=1, open_states=0, least_points=1, most_points=1, trials=1, views=2
+    )
+    return annotate(catalog.object_ids(_CATEGORY, "train", number + 1)[-1], config)
+
+
+def _pictures(number: int) -> list[Picture]:
+    """Small pictures of a labelled object."""
+    from artgym.annotation.annotate import labelled_ids
+    from artgym.datasets.generate import GenerationConfig, make_pictures
+
+    config = GenerationConfig(views=1, camera_size=(160, 120), min_points=40)
+    return make_pictures(labelled_ids(_CATEGORY, "train")[number], config)
 
 
 def _fail(fault: str) -> None:
@@ -161,9 +195,11 @@ def _fail(fault: str) -> None:
 def command(text: str) -> int:
     """What the processes that are tormented run; see ``_Command``."""
     given = json.loads(text)
+    work = given.pop("work")
     shards = [ShardTask(f"{each['seed']:04d}.h5", Shard(**each)) for each in given.pop("shards")]
     try:
-        run_shards(shards, make_shard, config={}, progress=False, **given)
+        write = write_pictures if work == "pictures" else write_arrays
+        run_shards(shards, make_shard, config={}, write=write, progress=False, **given)
     except ShardsFailedError as error:
         print(error, file=sys.stderr)
         return _SET_ASIDE
@@ -197,6 +233,7 @@ class _Command:
             "backend": self.engine,
             "workers": self.workers,
             "timeout": self.timeout,
+            "work": self.shards[0].work,
             "shards": [asdict(each) for each in self.shards],
         }
         script = "import sys; from benchmarks.faults import command; sys.exit(command(sys.argv[1]))"
@@ -308,7 +345,7 @@ class _Torment:
             self._check_end(each, process.returncode)
         self._say_farewell(each)
         for path in self.folder.glob("*"):
-            if (problem := _unreadable(path)) is not None:
+            if (problem := _unreadable(path, self.config.work)) is not None:
                 self.counts["unreadable"] += 1
                 self.problems.append(problem)
         if not is_killed:
@@ -332,6 +369,7 @@ class _Torment:
         scars.mkdir()
         shards = [
             Shard(
+                work=self.config.work,
                 seed=seed,
                 draws=self.config.draws,
                 fault=by_seed.get(seed),
@@ -378,8 +416,9 @@ class _Torment:
 
     def _command(self, shards: Sequence[Shard] | None = None) -> _Command:
         if shards is None:
-            draws = self.config.draws
-            shards = [Shard(seed=seed, draws=draws) for seed in range(self.config.shards)]
+            work, draws = self.config.work, self.config.draws
+            seeds = range(self.config.shards)
+            shards = [Shard(work=work, seed=seed, draws=draws) for seed in seeds]
         self.folder.parent.mkdir(parents=True, exist_ok=True)
         return _Command(self.engine, self.workers, self.folder, shards, self.config.timeout)
 
@@ -420,11 +459,12 @@ def _folder_bytes(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in paths}
 
 
-def _unreadable(path: Path) -> str | None:
+def _unreadable(path: Path, work: Work) -> str | None:
     """Why a file at its final path cannot be read, None where it can."""
+    read = read_pictures if work == "pictures" else read_arrays
     try:
         if path.suffix == ".h5":
-            read_arrays(path)
+            read(path)
         elif path.name == MANIFEST_NAME:
             Manifest.read(path.parent)
     except ArtgymError as error:
@@ -523,9 +563,10 @@ def table_from_rows(rows: dict[str, dict[str, Any]]) -> Table:
 
 
 def report(config: FaultsConfig) -> list[Table]:
-    """Measures, writes ``faults.json`` and gives the table."""
+    """Measures, writes the result and gives the table."""
     result = measure(config)
-    record.write_result(config.out / "faults.json", result)
+    name = "faults" if config.work == "numbers" else f"faults_{config.work}"
+    record.write_result(config.out / f"{name}.json", result)
     return [table_from_rows(result["rows"])]
 
 

@@ -30,6 +30,19 @@ def test_a_small_run(tmp_path, capsys):
     assert row["compared"] >= 3
 
 
+@pytest.mark.parametrize("work", ["labels", "pictures"])
+def test_real_shards(work, tmp_path):
+    sizes = {"workers": 2, "kills": 1, "faults": 0, "shards": 3, "timeout": 120}
+    arguments = [word for name, size in sizes.items() for word in (f"--{name}", str(size))]
+    arguments += ["--work", work, "--engines", "loky", "--out", str(tmp_path)]
+    assert faults.main(arguments) == 0
+    row = json.loads((tmp_path / f"faults_{work}.json").read_text())["rows"]["loky, 2"]
+    assert row["problems"] == []
+    assert row["kills"] == 1
+    assert row["different"] == 0
+    assert row["compared"] >= 2
+
+
 def test_what_stays_behind_is_found(monkeypatch):
     monkeypatch.setattr(faults, "_FAREWELL", 0.2)
     command = faults._Command("loky", 2, None, [], 1.0)
