@@ -28,9 +28,9 @@ from artgym.datasets.generate import SETS
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.grasps import NUM_CANDIDATES
+from artgym.geometry.hand import T_hand_grasp
 from artgym.objects import catalog
 from artgym.objects.urdf_export import write_urdf
-from artgym.sim.robots import T_hand_grasp
 from artgym.sim.setting import MAX_YAW
 from benchmarks import record
 from benchmarks.command import run

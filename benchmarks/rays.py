@@ -18,6 +18,7 @@ from rich.table import Table
 
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
+from artgym.geometry.hand import T_hand_tcp
 from artgym.geometry.rotations import frame_from_z
 from artgym.objects import catalog
 from artgym.objects.contents import TriangleMesh
@@ -27,7 +28,6 @@ from artgym.sim import rays
 from artgym.sim.camera import RenderedCamera, View, ViewDistribution
 from artgym.sim.masks import ROBOT, MaskCodes
 from artgym.sim.renderer import render_system
-from artgym.sim.robots import T_hand_tcp
 from artgym.sim.scene import ManipulationScene
 from artgym.sim.setting import add_lights, random_placement, random_table
 from benchmarks import record

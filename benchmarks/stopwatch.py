@@ -242,9 +242,9 @@ class OurTimings:
         from artgym.control import MAX_ROTATION, MAX_TRANSLATION, MAX_WIDTH
         from artgym.envs.articulated_env import WORKSPACE_HIGH, WORKSPACE_LOW
         from artgym.geometry import transforms
+        from artgym.geometry.hand import T_hand_tcp
         from artgym.geometry.rotations import matrix_from_axis_angle
         from artgym.sim.conversion import pose_from_transform
-        from artgym.sim.robots import T_hand_tcp
 
         T_tcp_hand = transforms.invert(T_hand_tcp)
         env = self._env("state", object_id)
@@ -289,8 +289,8 @@ def bare_scene(drive: Drive, awake: bool) -> Iterator[Any]:
         awake: whether the simulator may let nothing sleep.
     """
     from artgym.geometry import transforms
+    from artgym.geometry.hand import T_hand_tcp
     from artgym.objects import catalog
-    from artgym.sim.robots import T_hand_tcp
     from artgym.sim.scene import ManipulationScene
 
     scene = ManipulationScene(
@@ -331,8 +331,8 @@ def require_same_motion(drive: Drive, awake: bool) -> None:
         OtherSceneError: the hand was not where it was in the environment.
     """
     from artgym.envs.articulated_env import SUBSTEPS
+    from artgym.geometry.hand import T_hand_tcp
     from artgym.sim.conversion import transform_from_pose
-    from artgym.sim.robots import T_hand_tcp
 
     with bare_scene(drive, awake) as scene:
         root = scene.hand.links[0]

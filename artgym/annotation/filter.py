@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from artgym.geometry import transforms
 from artgym.geometry.grasps import GRASP_DEPTH
+from artgym.geometry.hand import FINGER_TRAVEL, HAND_BOXES, open_hand_boxes
 from artgym.objects.model import ArticulatedObject
 from artgym.objects.surface import grid_points
-from artgym.sim.robots import FINGER_ORIGIN, FINGER_TRAVEL, HAND_BOXES, T_hand_grasp
 
 Array = NDArray[np.floating]
 
@@ -46,21 +46,7 @@ class FilterConfig:
     reach: float = 0.004
 
 
-def _open_hand_boxes() -> tuple[Array, Array, Array]:
-    """Rotations (b, 3, 3), centres (b, 3) in the grasp's frame and half sizes (b, 3)."""
-    T_grasp_hand = transforms.invert(T_hand_grasp)
-    offsets = {
-        "hand": (0.0, 0.0, 0.0),
-        "left": (0.0, FINGER_TRAVEL, FINGER_ORIGIN),
-        "right": (0.0, -FINGER_TRAVEL, FINGER_ORIGIN),
-    }
-    T = np.stack(
-        [T_grasp_hand @ transforms.translation(offsets[b.link]) @ b.T_link_box for b in HAND_BOXES]
-    )
-    return T[:, :3, :3], T[:, :3, 3], np.array([b.half_size for b in HAND_BOXES])
-
-
-_BOX_R, _BOX_CENTER, _BOX_HALF = _open_hand_boxes()
+_BOX_R, _BOX_CENTER, _BOX_HALF = open_hand_boxes()
 #: No point farther than this from the grasp can be inside the hand.
 _HAND_RADIUS = float(
     max(np.linalg.norm(c) + np.linalg.norm(h) for c, h in zip(_BOX_CENTER, _BOX_HALF, strict=True))

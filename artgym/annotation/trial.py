@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artgym.geometry import transforms
+from artgym.geometry.hand import T_hand_grasp
 from artgym.objects.model import ArticulatedObject
 from artgym.sim.contact import PartContact
 from artgym.sim.conversion import poses_from_transforms
-from artgym.sim.robots import T_hand_grasp
 from artgym.sim.scene import ManipulationScene, PhysicsConfig
 from artgym.tasks.success import TRAVEL_THRESHOLD, Progress
 

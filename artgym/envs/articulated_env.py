@@ -19,19 +19,13 @@ from artgym.envs.observations import IMAGE_MODES, ObservationConfig, Observer, O
 from artgym.envs.snapshot import Snapshot
 from artgym.errors import InvalidArgumentError, NotReadyError
 from artgym.geometry import quaternions, transforms
+from artgym.geometry.hand import T_hand_tcp
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject
 from artgym.sim.camera import RenderedCamera, View, ViewDistribution
 from artgym.sim.contact import PartContact
 from artgym.sim.renderer import own_render_system
-from artgym.sim.robots import (
-    ACTION_SIZES,
-    CONTROL_MODES,
-    ControlMode,
-    RobotName,
-    T_hand_tcp,
-    hand_from_tcp,
-)
+from artgym.sim.robots import ACTION_SIZES, CONTROL_MODES, ControlMode, RobotName, hand_from_tcp
 from artgym.sim.scene import ManipulationScene, PlacedObject, Reading
 from artgym.sim.setting import add_lights, random_hand_start, random_placement, random_table
 from artgym.tasks import rewards

@@ -15,8 +15,8 @@ from artgym.envs.articulated_env import ArticulatedEnv
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.grasps import T_GRASP_TCP, candidate_rotations
+from artgym.geometry.hand import T_hand_grasp
 from artgym.geometry.rotations import matrix_from_axis_angle
-from artgym.sim.robots import T_hand_grasp
 from artgym.sim.setting import MAX_YAW
 
 Array = NDArray[np.floating]

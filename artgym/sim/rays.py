@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.camera import pixel_rays
+from artgym.geometry.hand import FINGER_ORIGIN
 from artgym.geometry.rotations import JAW_SYMMETRY
 from artgym.objects.meshes import link_triangles
 from artgym.objects.model import Link
 from artgym.sim.camera import FAR, NEAR, View
 from artgym.sim.masks import NOTHING, TABLE
-from artgym.sim.robots import FINGER_ORIGIN, RobotName, panda_meshes
+from artgym.sim.robots import RobotName, panda_meshes
 from artgym.sim.scene import TABLE_HALF_SIZE
 
 Array = NDArray[np.floating]

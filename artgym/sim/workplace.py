@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
+from artgym.geometry.hand import T_hand_tcp
 from artgym.geometry.rotations import frame_from_z
 from artgym.objects.model import ArticulatedObject
 from artgym.sim.kinematics import choose_base
-from artgym.sim.robots import T_hand_tcp
 
 Array = NDArray[np.floating]
 

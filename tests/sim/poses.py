@@ -6,9 +6,9 @@ import numpy as np
 
 from artgym.geometry import transforms
 from artgym.geometry.grasps import T_GRASP_TCP
+from artgym.geometry.hand import T_hand_tcp
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject
-from artgym.sim.robots import T_hand_tcp
 
 #: Columns (x, closing direction, approach): towards -x, closing upright or across.
 CLOSING_UP = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

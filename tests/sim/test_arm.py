@@ -7,12 +7,12 @@ import pytest
 
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
+from artgym.geometry.hand import HAND_BOXES
 from artgym.geometry.rotations import geodesic_angle, matrix_from_axis_angle
 from artgym.objects import catalog
 from artgym.sim.arm import PandaArm
 from artgym.sim.conversion import pose_from_transform, transform_from_pose
 from artgym.sim.kinematics import REST, choose_base, link_poses, panda_chain
-from artgym.sim.robots import HAND_BOXES
 from artgym.sim.scene import ManipulationScene
 from tests.sim.poses import CLOSING_UP, bar_bounds, drawer_with_lying_bar, hand_from_tcp
 

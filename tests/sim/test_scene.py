@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from artgym.geometry import transforms
+from artgym.geometry.hand import HAND_BOXES, T_hand_grasp, T_hand_tcp
 from artgym.geometry.rotations import geodesic_angle, matrix_from_axis_angle
 from artgym.objects import catalog
 from artgym.sim.contact import PartContact
 from artgym.sim.conversion import pose_from_transform
-from artgym.sim.robots import HAND_BOXES, T_hand_grasp, T_hand_tcp
 from artgym.sim.scene import ManipulationScene
 from tests.sim.poses import (
     CLOSING_ACROSS,
