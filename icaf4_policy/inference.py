@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points
+from icaf4_policy.collisions import CollisionConfig, hand_is_free
 from icaf4_policy.model import Icaf4, Outputs
 from icaf4_policy.pose_fitting import PoseFit, fit_pose
 from icaf4_policy.tabletop import MIN_OBJECT_POINTS, ObjectView, segment_object
@@ -34,12 +36,15 @@ class ProposalConfig:
         count: J, the most proposals to return.
         distance: metres, and
         angle: radians; a proposal nearer than both to a better one is dropped.
+        collisions: when the open hand would be inside what is seen, the proposal is dropped; None
+            keeps it.
     """
 
     points: int = 384
     count: int = 64
     distance: float = 0.02
     angle: float = float(np.radians(25.0))
+    collisions: CollisionConfig | None = field(default_factory=CollisionConfig)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -185,7 +190,14 @@ class Perception:
         """
         view = segment_object(depth, intrinsics, rgb, up_camera_hint, exclude_mask, rng=rng)
         R_level_camera = level_from_camera(view.up_camera)
-        return self.predict(view.points_camera, view.colors, R_level_camera, rng=rng), view
+        prediction = self.predict(
+            view.points_camera,
+            view.colors,
+            R_level_camera,
+            table_camera=view.table_camera,
+            rng=rng,
+        )
+        return prediction, view
 
     @torch.inference_mode()
     def predict(
@@ -194,6 +206,7 @@ class Perception:
         colors: ArrayLike,
         R_level_camera: ArrayLike,
         *,
+        table_camera: ArrayLike | None = None,
         rng: np.random.Generator,
     ) -> Prediction:
         """Predicts everything about an object from its points.
@@ -202,12 +215,15 @@ class Perception:
             points_camera: (M, 3), metres, of the object alone.
             colors: uint8 (M, 3).
             R_level_camera: (3, 3).
+            table_camera: (3,), a point of the table, which the hand keeps out of.
             rng: for the fits and the choice of points.
         """
         outputs, points, pick = self._look(
             points_camera, colors, R_level_camera, rng, self.proposals.points
         )
-        return self._prediction(outputs, points, pick, np.asarray(R_level_camera, dtype=float), rng)
+        R_level_camera = np.asarray(R_level_camera, dtype=float)
+        table = None if table_camera is None else np.asarray(table_camera, dtype=float)
+        return self._prediction(outputs, points, pick, R_level_camera, table, rng)
 
     @torch.inference_mode()
     def point_grasps(
@@ -267,6 +283,7 @@ class Perception:
         points: Array,
         pick: NDArray[np.int64],
         R_level_camera: Array,
+        table_camera: Array | None,
         rng: np.random.Generator,
     ) -> Prediction:
         num_parts = self.model.config.num_parts
@@ -313,7 +330,9 @@ class Perception:
             part_boxes=tuple(part_boxes),
             object_boxes=tuple(object_boxes),
             joints=tuple(joints),
-            grasps=self._ranked_grasps(outputs, points, part, affordance, R_level_camera),
+            grasps=self._ranked_grasps(
+                outputs, points, part, affordance, R_level_camera, table_camera
+            ),
             R_level_camera=R_level_camera,
         )
 
@@ -324,8 +343,9 @@ class Perception:
         part: NDArray[np.int64],
         affordance: Array,
         R_level_camera: Array,
+        table_camera: Array | None,
     ) -> Grasps:
-        """Scores every (point, anchor) pair and keeps the best that differ."""
+        """Scores every (point, anchor) pair and keeps the best that differ and are free."""
         asked = outputs.grasp_points[0].numpy()  # (S,)
         anchors = anchors_from_config(self.model.config.anchors)
         scores = affordance[asked, None] * outputs.anchors[0].sigmoid().numpy()  # (S, L)
@@ -336,7 +356,19 @@ class Perception:
         row, anchor = np.unravel_index(keep, scores.shape)
         residuals = outputs.residuals[0].numpy()[row, anchor]
         R_grasps = R_level_camera.T @ anchors.grasps(anchor, residuals)
-        chosen = diverse(points[asked[row]], R_grasps, self.proposals)
+        collisions = self.proposals.collisions
+
+        def fits(candidate: int) -> bool:
+            return collisions is None or hand_is_free(
+                points,
+                R_grasps[candidate],
+                points[asked[row[candidate]]],
+                R_level_camera[2],
+                table_camera,
+                collisions,
+            )
+
+        chosen = diverse(points[asked[row]], R_grasps, self.proposals, fits)
         source = asked[row[chosen]]
         return Grasps(
             points_camera=points[source],
@@ -349,20 +381,28 @@ class Perception:
 _NO_JOINT = JointEstimate(joint_type=JOINT_NONE, axis_camera=np.zeros(3), pivot_camera=np.zeros(3))
 
 
-def diverse(points: Array, R_grasps: Array, config: ProposalConfig) -> NDArray[np.int64]:
+def diverse(
+    points: Array,
+    R_grasps: Array,
+    config: ProposalConfig,
+    fits: Callable[[int], bool] = lambda _: True,
+) -> NDArray[np.int64]:
     """Indices of grasps, best first, none near a better one (non-maximum suppression).
 
     Args:
         points: (n, 3), metres, best first.
         R_grasps: (n, 3, 3).
         config: how near is near, and how many to keep.
+        fits: whether the grasp of an index may be kept at all.
     """
     alive = np.ones(len(points), dtype=bool)
     chosen = []
     while alive.any() and len(chosen) < config.count:
         best = int(np.argmax(alive))
-        chosen.append(best)
         alive[best] = False
+        if not fits(best):
+            continue
+        chosen.append(best)
         near = np.flatnonzero(alive)
         near = near[((points[near] - points[best]) ** 2).sum(axis=-1) < config.distance**2]
         alive[near[grasp_angle(R_grasps[best], R_grasps[near]) < config.angle]] = False

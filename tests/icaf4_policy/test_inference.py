@@ -1,3 +1,4 @@
+import dataclasses
 import json
 
 import numpy as np
@@ -139,9 +140,17 @@ def test_the_best_of_near_grasps_is_kept():
     np.testing.assert_array_equal(diverse(points, rotations, ProposalConfig()), [0, 2])
 
 
+def test_what_does_not_fit_is_passed_over():
+    points = np.array([[0.0, 0, 0], [0.001, 0, 0], [0.3, 0, 0]])
+    R_grasps = np.tile(np.eye(3), (3, 1, 1))
+    chosen = diverse(points, R_grasps, ProposalConfig(), lambda index: index != 0)
+    np.testing.assert_array_equal(chosen, [1, 2])
+
+
 def test_point_grasps_and_ranked_grasps_agree(perception, sample):
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
-    ranked = perception.predict(*seen, rng=rng()).grasps
+    keeps_all = dataclasses.replace(perception.proposals, collisions=None)
+    ranked = dataclasses.replace(perception, proposals=keeps_all).predict(*seen, rng=rng()).grasps
     everywhere = perception.point_grasps(*seen, top=1, rng=rng())
     scores = everywhere.affordance * everywhere.scores[:, 0]
     best = int(np.argmax(scores))
