@@ -291,6 +291,7 @@ def generate(
     scenes: tuple[int, int, int] = (640, 64, 96),
     camera_size: tuple[int, int] = (640, 480),
     depth_noise: bool = False,
+    label_radius_mm: float = 3.0,
     seed: int = 0,
     workers: int = 1,
     backend: Literal["loky", "dask", "ray"] = "loky",
@@ -308,6 +309,8 @@ def generate(
         scenes: of reartmix, pictures of the train, val and test split.
         camera_size: width and height, pixels.
         depth_noise: give depth the errors of a real sensor.
+        label_radius_mm: how far a labelled point speaks for the points around it; farther, more of
+            a picture is labelled, and less surely.
         seed: of views, lights and placements.
         workers: processes; any number gives the same bytes.
         backend: loky for processes of this machine, or a cluster's dask or ray.
@@ -320,7 +323,11 @@ def generate(
             # A wrong name shall be called that, and not a lack of labels.
             _catalogue_ids(name, each, None)
     config = pictures.GenerationConfig(
-        views=views, camera_size=camera_size, depth_noise=depth_noise, seed=seed
+        views=views,
+        camera_size=camera_size,
+        depth_noise=depth_noise,
+        label_radius=label_radius_mm / 1000.0,
+        seed=seed,
     )
     counts: dict[str, int] = dict(zip(("train", "val", "test"), scenes, strict=True))
     options: dict[str, Any] = {

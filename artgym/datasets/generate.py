@@ -104,6 +104,22 @@ class GenerationConfig:
     depth_noise: bool = False
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        counts = {"views": self.views, "camera_size": min(self.camera_size), "seed": self.seed + 1}
+        for name in ("max_points", "min_points", "min_scene_points"):
+            counts[name] = getattr(self, name)
+        for name, count in counts.items():
+            if count < 1:
+                least = 0 if name == "seed" else 1
+                raise InvalidArgumentError(
+                    f"{name}={getattr(self, name)}: expected {least} or more."
+                )
+        for name in ("clearance", "label_radius", "label_angle", "label_margin"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InvalidArgumentError(
+                    f"{name}={getattr(self, name)}: expected 0 or more, and finite."
+                )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _CarriedLabels:

@@ -302,3 +302,19 @@ def test_without_labels(tmp_path):
     with pytest.raises(DamagedFileError, match="drawer_1001"):
         make_pictures("drawer/1001", CONFIG, tmp_path)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"views": 0},
+        {"camera_size": (640, 0)},
+        {"seed": -1},
+        {"min_points": 0},
+        {"label_radius": -0.001},
+        {"label_margin": float("nan")},
+    ],
+)
+def test_wrong_settings_are_named(wrong):
+    with pytest.raises(InvalidArgumentError, match=next(iter(wrong))):
+        GenerationConfig(**wrong)
