@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import safetensors
 import safetensors.torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.files import write_file_whole
@@ -27,6 +27,8 @@ FORMAT = 1
 _METADATA = "json"
 
 _PACKAGES = ("torch", "numpy", "safetensors")
+
+Network = TypeVar("Network", bound=nn.Module)
 
 
 def save_tensors(path: Path, tensors: Mapping[str, Tensor], facts: Mapping[str, Any]) -> None:
@@ -68,12 +70,12 @@ def installed_versions() -> dict[str, str]:
     return found
 
 
-def save_model(weights: Path, model: Icaf4, facts: Mapping[str, Any]) -> None:
+def save_model(weights: Path, model: nn.Module, facts: Mapping[str, Any]) -> None:
     """Writes ``weights`` (safetensors) and its description (JSON, with the weights' SHA-256).
 
     Args:
         weights: path that ends in ``.safetensors``.
-        model: what to save.
+        model: what to save; its ``config`` is a dataclass.
         facts: JSON-able facts of the training.
     """
     if weights.suffix != ".safetensors":
@@ -84,7 +86,8 @@ def save_model(weights: Path, model: Icaf4, facts: Mapping[str, Any]) -> None:
     description = {
         "format": FORMAT,
         "sha256": hashlib.sha256(data).hexdigest(),
-        "model": asdict(model.config),
+        "network": type(model).__name__,
+        "model": asdict(model.config),  # pyright: ignore[reportArgumentType]
         "training": dict(facts),
         "versions": installed_versions(),
     }
@@ -104,11 +107,23 @@ def _config_from_json(fields: dict[str, Any]) -> ModelConfig:
 
 
 def load_model(weights: Path) -> tuple[Icaf4, dict[str, Any]]:
+    """``load_network`` for the network of parts, poses, joints and grasps."""
+    return load_network(weights, Icaf4, lambda fields: Icaf4(_config_from_json(fields)))
+
+
+def load_network(
+    weights: Path, kind: type[Network], build: Callable[[dict[str, Any]], Network]
+) -> tuple[Network, dict[str, Any]]:
     """The network of a weights file, in evaluation mode, and its description.
 
+    Args:
+        weights: written by ``save_model``.
+        kind: what it should hold.
+        build: makes one from the JSON fields of its configuration.
+
     Raises:
-        DamagedFileError: the weights or the description are missing, cut short, altered, or do
-            not belong together; the message names the file.
+        DamagedFileError: the weights or the description are missing, cut short, altered, of
+            another kind, or do not belong together; the message names the file.
     """
     described_at = description_path(weights)
     try:
@@ -118,8 +133,14 @@ def load_model(weights: Path) -> tuple[Icaf4, dict[str, Any]]:
                 f"{described_at} has format {description['format']!r}, expected {FORMAT}. "
                 "Train again, or install the version that wrote it."
             )
+        found_kind = description["network"]
+        if found_kind != kind.__name__:
+            raise DamagedFileError(
+                f"{described_at} describes weights of {found_kind}, expected {kind.__name__}. "
+                "Give the weights that belong here."
+            )
         expected = description["sha256"]
-        model = Icaf4(_config_from_json(description["model"]))
+        model = build(description["model"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DamagedFileError(
             f"{described_at} cannot be read as the description of weights "

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
-import json
 import math
-import platform
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import torch
-from torch import Tensor
 from tqdm import tqdm
 
 from artgym.datasets.sample import Sample
-from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.errors import InvalidArgumentError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
-from icaf4_policy.checkpoint import load_tensors, save_model, save_tensors
 from icaf4_policy.dataset import SPARE_POINTS
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig
@@ -32,6 +27,7 @@ from icaf4_policy.targets import (
     draw_item,
     targets_from_sample,
 )
+from icaf4_policy.training_run import TrainingRun, cosine_rate, keep_freed_memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,15 +101,6 @@ class TrainingConfig:
             raise InvalidArgumentError(f"warmup_share={self.warmup_share} must be in [0, 1).")
 
 
-def _keep_freed_memory() -> None:
-    """Tells glibc to reuse freed blocks: returning large ones costs a third of a step."""
-    if platform.libc_ver()[0] == "glibc":
-        libc = ctypes.CDLL(None)
-        trim_threshold, mmap_max = -1, -4
-        libc.mallopt(mmap_max, 0)
-        libc.mallopt(trim_threshold, 2**31 - 1)
-
-
 def prepare(
     samples: Iterable[Sample], config: TrainingConfig, label: str
 ) -> tuple[list[Targets], str]:
@@ -161,11 +148,7 @@ def _learning_rate(config: TrainingConfig, step: int, steps_an_epoch: int) -> fl
         drops = step // steps_an_epoch // config.step_epochs
         return config.learning_rate * config.step_factor**drops
     total = config.epochs * steps_an_epoch
-    warmup = config.warmup_share * total
-    if step < warmup:
-        return config.learning_rate * (step + 1) / (warmup + 1)
-    progress = (step - warmup) / max(total - warmup, 1)
-    return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * progress))
+    return cosine_rate(config.learning_rate, step, total, config.warmup_share)
 
 
 def _batches(
@@ -195,7 +178,6 @@ def _validate(
     model: Icaf4, targets: Sequence[Targets], draw: DrawConfig, config: TrainingConfig
 ) -> dict[str, float]:
     """Mean loss terms over the validation samples, and their weighted "total"."""
-    model.eval()
     sums: dict[str, float] = {}
     for batch in _batches(targets, draw, config.batch_size, seed=config.seed, epoch=None):
         outputs = model(batch.points_level, batch.colors, batch.grasp_points)
@@ -203,74 +185,7 @@ def _validate(
         terms["total"] = total_loss(terms, config.losses)
         for name, term in terms.items():
             sums[name] = sums.get(name, 0.0) + float(term) * len(batch.part)
-    model.train()
     return {name: value / len(targets) for name, value in sums.items()}
-
-
-class _Progress:
-    """The state of a run between two epochs, in memory and on disk."""
-
-    def __init__(self, model: Icaf4, config: TrainingConfig, fingerprint: str) -> None:
-        self.model = model
-        self.optimizer = torch.optim.Adam(
-            model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
-        )
-        self.fingerprint = fingerprint
-        self.epoch = 0
-        self.best: dict[str, Tensor] = {}
-        self.best_epoch = -1
-        self.history: list[dict[str, float]] = []
-
-    def consider(self, validation: dict[str, float]) -> None:
-        """Notes a validation, and keeps the weights if it is the best so far."""
-        self.history.append({"epoch": float(self.epoch), **validation})
-        if validation["total"] <= min(entry["total"] for entry in self.history):
-            self.best_epoch = self.epoch
-            self.best = {name: t.clone() for name, t in self.model.state_dict().items()}
-
-    def save(self, path: Path) -> None:
-        """Writes everything that the rest of the run depends on."""
-        tensors = {f"model.{name}": t for name, t in self.model.state_dict().items()}
-        tensors |= {f"best.{name}": t for name, t in self.best.items()}
-        for index, state in self.optimizer.state_dict()["state"].items():
-            tensors |= {f"adam.{index}.{name}": t for name, t in state.items()}
-        facts = {
-            "fingerprint": self.fingerprint,
-            "epoch": self.epoch,
-            "best_epoch": self.best_epoch,
-            "history": self.history,
-        }
-        save_tensors(path, tensors, facts)
-
-    def load(self, path: Path) -> None:
-        """Takes up the run that ``save`` left."""
-        tensors, facts = load_tensors(path)
-        if facts.get("fingerprint") != self.fingerprint:
-            raise InvalidArgumentError(
-                f"{path} belongs to a run with another configuration or other samples. "
-                "Delete it to start afresh, or give another output path."
-            )
-        groups: dict[str, dict[str, Tensor]] = {"model": {}, "best": {}, "adam": {}}
-        for name, tensor in tensors.items():
-            group, _, rest = name.partition(".")
-            groups[group][rest] = tensor
-        adam: dict[int, dict[str, Tensor]] = {}
-        for name, tensor in groups["adam"].items():
-            index, _, slot = name.partition(".")
-            adam.setdefault(int(index), {})[slot] = tensor
-        try:
-            self.model.load_state_dict(groups["model"])
-            self.optimizer.load_state_dict({**self.optimizer.state_dict(), "state": adam})
-        except (RuntimeError, ValueError, KeyError) as error:
-            raise DamagedFileError(f"{path} does not hold this network ({error}).") from error
-        self.best = groups["best"]
-        self.epoch, self.best_epoch = int(facts["epoch"]), int(facts["best_epoch"])
-        self.history = list(facts["history"])
-
-
-def resume_path(weights: Path) -> Path:
-    """Where an unfinished run of ``weights`` is kept."""
-    return weights.with_suffix(".resume.safetensors")
 
 
 def train(
@@ -298,7 +213,7 @@ def train(
         The network with the weights that were written, in evaluation mode; after an early stop,
         with the best so far, and no result is written.
     """
-    _keep_freed_memory()
+    keep_freed_memory()
     training, training_digest = prepare(training_samples, config, "training samples")
     validation, validation_digest = prepare(validation_samples, config, "validation samples")
     if not training or not validation:
@@ -310,75 +225,52 @@ def train(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         model = Icaf4(model_config)
-    settings = json.dumps([asdict(config), training_digest, validation_digest], sort_keys=True)
-    progress = _Progress(model, config, hashlib.sha256(settings.encode()).hexdigest())
-    if resume_path(weights).exists():
-        progress.load(resume_path(weights))
-
-    draw = DrawConfig(
-        num_points=config.num_points,
-        num_anchors=model.grasp.shape[0],
-        num_grasp_points=config.num_grasp_points,
-        color_jitter=config.color_jitter,
+    optimizer = torch.optim.Adam(
+        model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
     )
+    settings = [asdict(config), training_digest, validation_digest]
+    run = TrainingRun(model, optimizer, settings, lambda validation: validation["total"])
     draw_plain = DrawConfig(
         num_points=config.num_points,
         num_anchors=model.grasp.shape[0],
         num_grasp_points=config.num_grasp_points,
     )
-    last = config.epochs if stop_after_epoch is None else min(stop_after_epoch, config.epochs)
-    while progress.epoch < last:
-        _train_epoch(progress, training, draw, config)
-        progress.epoch += 1
-        if progress.epoch % config.validate_every == 0 or progress.epoch == config.epochs:
-            progress.consider(_validate(model, validation, draw_plain, config))
-            shown = {name: round(value, 4) for name, value in progress.history[-1].items()}
-            tqdm.write(f"validation {shown}")
-        progress.save(resume_path(weights))
-
-    if progress.best:
-        model.load_state_dict(progress.best)
-    model.eval()
-    if progress.epoch == config.epochs:
-        facts: dict[str, Any] = {
+    draw = replace(draw_plain, color_jitter=config.color_jitter)
+    run.complete(
+        weights,
+        epochs=config.epochs,
+        stop_after_epoch=stop_after_epoch,
+        validate_every=config.validate_every,
+        train_epoch=lambda: _train_epoch(run, model, training, draw, config),
+        validate=lambda: _validate(model, validation, draw_plain, config),
+        facts={
             "config": asdict(config),
             "training_samples": len(training),
             "training_sha256": training_digest,
             "validation_samples": len(validation),
             "validation_sha256": validation_digest,
-            "best_epoch": progress.best_epoch,
-            "validation": progress.history,
-        }
-        save_model(weights, model, facts)
-        resume_path(weights).unlink(missing_ok=True)
+        },
+    )
     return model
 
 
 def _train_epoch(
-    progress: _Progress, targets: Sequence[Targets], draw: DrawConfig, config: TrainingConfig
+    run: TrainingRun,
+    model: Icaf4,
+    targets: Sequence[Targets],
+    draw: DrawConfig,
+    config: TrainingConfig,
 ) -> None:
     """One pass over the training samples."""
-    model, optimizer = progress.model, progress.optimizer
-    model.train()
     steps_an_epoch = max(len(targets) // config.batch_size, 1)
-    batches = _batches(targets, draw, config.batch_size, seed=config.seed, epoch=progress.epoch)
-    label = f"epoch {progress.epoch + 1}/{config.epochs}"
+    batches = _batches(targets, draw, config.batch_size, seed=config.seed, epoch=run.epoch)
+    label = f"epoch {run.epoch + 1}/{config.epochs}"
     bar = tqdm(batches, total=steps_an_epoch, desc=label, unit="batch", leave=False, disable=None)
     for number, batch in enumerate(bar):
-        step = progress.epoch * steps_an_epoch + number
-        for group in optimizer.param_groups:
-            group["lr"] = _learning_rate(config, step, steps_an_epoch)
         with torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bfloat16"):
             outputs = model(batch.points_level, batch.colors, batch.grasp_points)
         loss = total_loss(loss_terms(outputs, batch, model.config.length_unit), config.losses)
-        if not torch.isfinite(loss):
-            raise InvalidArgumentError(
-                f"the loss is {loss.item()} in epoch {progress.epoch + 1}, step {number + 1}: "
-                f"lower learning_rate={config.learning_rate}, or look for bad samples with "
-                "'artgym check'."
-            )
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), config.gradient_limit)
-        optimizer.step()
+        step = run.epoch * steps_an_epoch + number
+        rate = _learning_rate(config, step, steps_an_epoch)
+        run.learn(loss, rate, config.gradient_limit)
         bar.set_postfix(loss=f"{loss.item():.3f}", refresh=False)

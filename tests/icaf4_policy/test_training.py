@@ -12,7 +12,8 @@ from icaf4_policy import cli
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
 from icaf4_policy.model import Icaf4, ModelConfig
-from icaf4_policy.training import TrainingConfig, resume_path, train
+from icaf4_policy.training import TrainingConfig, train
+from icaf4_policy.training_run import resume_path
 from tests.icaf4_policy.toy import toy_picture, toy_sample
 
 CONFIG = TrainingConfig(
