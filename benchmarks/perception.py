@@ -46,6 +46,7 @@ _PRINTED = (
     ("joint_pivot_percent", "  in % of the object's diameter", 1),
     ("grasp/network/error_deg", "grasp best-match error, deg", 1),
     ("grasp_points_called", "graspable points called so, share", 3),
+    ("executed", "best grasp succeeds in physics, share", 3),
     ("label_density", "tries that succeed, share", 3),
     ("label_density_graspable", "  at graspable points", 3),
 )

@@ -33,7 +33,7 @@ def true_object_boxes(sample: Sample) -> Array:
 
 def evaluate_sample(
     perception: Perception, sample: Sample, rng: np.random.Generator, *, top: int = 10
-) -> dict[str, float]:
+) -> tuple[dict[str, float], Prediction]:
     """Every metric of one view, from the points of the sample's object.
 
     Args:
@@ -43,10 +43,10 @@ def evaluate_sample(
         top: J, proposals a point that coverage counts.
 
     Returns:
-        A row for ``metrics.mean_rows``; NaN where a metric does not apply. Grasp metrics are over
-        the points with successful tries that the network calls graspable
-        (``grasp/network/...``), and over all its calls, where one at a point that offers nothing
-        misses (``grasp_calls/network/...``), each beside its chance rows.
+        A row for ``metrics.mean_rows``, and the prediction that it is of; NaN where a metric does
+        not apply. Grasp metrics are over the points with successful tries that the network calls
+        graspable (``grasp/network/...``), and over all its calls, where one at a point that offers
+        nothing misses (``grasp_calls/network/...``), each beside its chance rows.
     """
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
     prediction = perception.predict(*seen, rng=rng)
@@ -61,7 +61,7 @@ def evaluate_sample(
     row["label_density"], row["label_density_graspable"] = metrics.label_density(
         sample.successful_tries()
     )
-    return row | _grasp_metrics(perception, sample, rng, top)
+    return row | _grasp_metrics(perception, sample, rng, top), prediction
 
 
 def _part_metrics(prediction: Prediction, sample: Sample) -> dict[str, float]:

@@ -189,7 +189,8 @@ def test_joint_votes_survive_outliers():
 
 
 def test_evaluation_gives_every_metric(perception, sample):
-    row = evaluate_sample(perception, sample, rng())
+    row, prediction = evaluate_sample(perception, sample, rng())
+    assert len(prediction.grasps.scores)
     assert 0 <= row["part_miou"] <= 1
     assert 0 <= row["affordance_miou"] <= 1
     for source in ("network", "normal_grid_roll", "normal_random_roll", "random_hemisphere"):
