@@ -78,7 +78,7 @@ def measure(config: DatasetSpeedConfig) -> dict[str, Any]:
                 "pictures": manifest.num_items,
                 "pictures_a_second": manifest.num_items / seconds,
                 "bytes_a_picture": sum(s.bytes for s in manifest.shards) / manifest.num_items,
-                "items_a_second": _item_rates(place, config.epochs),
+                "items_a_second": _item_rates(place, category, config.epochs),
             }
     result = {
         **record.provenance("benchmarks.speed"),
@@ -90,11 +90,11 @@ def measure(config: DatasetSpeedConfig) -> dict[str, Any]:
     return result
 
 
-def _item_rates(folder: Path, epochs: int) -> list[float]:
+def _item_rates(folder: Path, category: str, epochs: int) -> list[float]:
     """Training items a second in each epoch, from one worker of a data loader."""
     anchors = anchors_from_config(AnchorConfig())
     draw = DrawConfig(num_points=_NUM_POINTS, num_anchors=len(anchors), color_jitter=0.2)
-    items = TrainingItems(SampleFolder(folder), anchors, draw)
+    items = TrainingItems(SampleFolder(folder), [category], anchors, draw)
     loader = DataLoader(
         items,
         batch_size=_BATCH_SIZE,

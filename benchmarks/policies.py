@@ -140,7 +140,7 @@ def load_perception(category: str, weights: Path | None) -> Any:
     path = weights_path(category, weights)
     from icaf4_policy.inference import Perception
 
-    return Perception.load(path)
+    return Perception.load(path, category)
 
 
 def policy_entry(name: str) -> PolicyEntry:

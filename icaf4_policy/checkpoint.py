@@ -102,6 +102,8 @@ def _config_from_json(fields: dict[str, Any]) -> ModelConfig:
     parts = {
         "anchors": AnchorConfig(**fields["anchors"]),
         "backbone": BackboneConfig(**backbone),
+        "categories": tuple(fields["categories"]),
+        "length_units": tuple(fields["length_units"]),
     }
     return ModelConfig(**{**fields, **parts})
 

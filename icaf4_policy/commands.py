@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +31,11 @@ def train(config: TrainingConfig, *, data: Path, out: Path, threads: int = 1) ->
         threads: of torch; results are repeatable for the same number of them.
     """
     torch.set_num_threads(threads)
-    folder = data / config.category
-    run_training(config, SampleFolder(folder / "train"), SampleFolder(folder / "val"), out)
+    training, validation = (
+        chain.from_iterable(SampleFolder(data / category / split) for category in config.category)
+        for split in ("train", "val")
+    )
+    run_training(config, training, validation, out)
     print(f"wrote {out} and {description_path(out)}")
     return 0
 
@@ -42,6 +46,7 @@ def predict(
     rgb: Path,
     depth: Path,
     intrinsics: Path,
+    category: str | None = None,
     picture: Path = Path("prediction.png"),
     depth_unit_m: float = 0.001,
     grasps: int = 10,
@@ -54,6 +59,7 @@ def predict(
         rgb: colour image.
         depth: 16-bit image in units of depth_unit_m, or .npy in metres; 0 where unknown.
         intrinsics: text or JSON file with the 3x3 camera matrix.
+        category: of the object, where the weights are for several.
         picture: where to draw parts, affordance and the best grasps.
         depth_unit_m: metres of one unit of a depth image.
         grasps: how many proposals to print and draw.
@@ -64,13 +70,13 @@ def predict(
         raise InvalidArgumentError(f"grasps={grasps} must be at least 0.")
     image, K = drawing.read_rgb(rgb), drawing.read_intrinsics(intrinsics)
     metres = drawing.read_depth(depth, depth_unit_m)
-    perception = Perception.load(weights)
+    perception = Perception.load(weights, category)
     prediction, view = perception.perceive(image, metres, K, rng=np.random.default_rng(seed))
     drawing.write_image(picture, drawing.draw_prediction(image, K, prediction, grasps))
     best = prediction.grasps
     parts = zip(prediction.part_boxes, prediction.joints, strict=True)
     report: dict[str, Any] = {
-        "category": perception.model.config.category,
+        "category": perception.category,
         "picture": str(picture),
         "pixels": int(view.mask.sum()),
         "up_camera": view.up_camera.tolist(),

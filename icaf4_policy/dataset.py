@@ -37,6 +37,7 @@ class TrainingItems(Dataset[Item]):
 
     Args:
         samples: such as a ``SampleFolder``, which is read lazily.
+        categories: those that the network is for.
         anchors: what successful grasps are matched with.
         config: how points are chosen.
         seed: of the choice.
@@ -45,13 +46,15 @@ class TrainingItems(Dataset[Item]):
     def __init__(
         self,
         samples: Sequence[Sample],
+        categories: Sequence[str],
         anchors: Anchors,
         config: DrawConfig,
         *,
         seed: int = 0,
     ) -> None:
         self.config = config
-        self._samples, self._anchors, self._seed = samples, anchors, seed
+        self._samples, self._categories = samples, categories
+        self._anchors, self._seed = anchors, seed
         self._targets: dict[int, Targets] = {}
 
     def __len__(self) -> int:
@@ -65,7 +68,10 @@ class TrainingItems(Dataset[Item]):
         epoch, number = divmod(index, len(self))
         if number not in self._targets:
             self._targets[number] = targets_from_sample(
-                self._samples[number], self._anchors, SPARE_POINTS * self.config.num_points
+                self._samples[number],
+                self._categories,
+                self._anchors,
+                SPARE_POINTS * self.config.num_points,
             )
         rng = np.random.default_rng((self._seed, epoch, number))
         return draw_item(self._targets[number], self.config, rng)

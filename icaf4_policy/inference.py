@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
+from torch import Tensor
 
 from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
-from artgym.errors import InvalidArgumentError
+from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
@@ -149,21 +150,43 @@ class Perception:
 
     Attributes:
         model: in evaluation mode.
+        category: of the objects to look at, one of those that the network is for.
         proposals: how grasps are ranked.
     """
 
     model: Icaf4
-    proposals: ProposalConfig
+    category: str
+    proposals: ProposalConfig = field(default_factory=ProposalConfig)
+
+    def __post_init__(self) -> None:
+        if self.category not in self.model.config.categories:
+            raise UnknownNameError("category", self.category, self.model.config.categories)
 
     @classmethod
-    def load(cls, weights: str | Path, proposals: ProposalConfig | None = None) -> Perception:
+    def load(cls, weights: str | Path, category: str | None = None) -> Perception:
         """Loads trained weights (``.safetensors``, description beside it).
+
+        Args:
+            weights: the file.
+            category: of the objects to look at; weights for a single one need none.
 
         Raises:
             DamagedFileError: either file is missing, damaged or does not match.
+            InvalidArgumentError: the weights are for several categories, and none was chosen.
+            UnknownNameError: they are not for this one.
         """
         model, _ = load_model(Path(weights))
-        return cls(model=model, proposals=proposals or ProposalConfig())
+        known = model.config.categories
+        if category is None and len(known) > 1:
+            raise InvalidArgumentError(
+                f"category: {weights} is for {', '.join(known)}; say which is looked at."
+            )
+        return cls(model=model, category=category or next(iter(known)))
+
+    @property
+    def _index(self) -> Tensor:
+        """The category (1,) as the network is told it."""
+        return torch.tensor([self.model.config.categories.index(self.category)])
 
     def perceive(
         self,
@@ -273,6 +296,7 @@ class Perception:
         outputs = self.model(
             torch.from_numpy(points_level[pick][None].astype(np.float32)),
             torch.from_numpy(colors[pick][None].astype(np.float32) / 255.0),
+            self._index,
             min(grasp_points, config.num_points),
         )
         return outputs, points_camera[pick], pick
@@ -300,7 +324,7 @@ class Perception:
         type_log = outputs.joint_type[0].log_softmax(dim=-1).numpy()
         axis_camera = outputs.joint_axis[0].numpy() @ R_level_camera
         offset_camera = outputs.joint_offset[0].numpy() @ R_level_camera
-        offset_camera = offset_camera * self.model.config.length_unit
+        offset_camera = offset_camera * float(self.model.units_of(self._index))
         for k in range(num_parts):
             on_part = part == k
             if on_part.sum() < MIN_PART_POINTS:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
@@ -22,17 +23,18 @@ class ModelConfig:
     """What a network is for and how large it is.
 
     Attributes:
-        category: "laptop", ...
-        num_parts: K, the base included.
-        length_unit: metres of one network unit; half the size of a typical object.
+        categories: ("laptop",), or several, which the network is told apart by.
+        num_parts: K, the base included; the most of any category.
+        length_units: metres of one network unit for each category; half the size of a typical
+            object.
         num_points: points of a cloud.
         anchors: what grasps are refined from.
         backbone: sizes of the backbone.
     """
 
-    category: str
+    categories: tuple[str, ...]
     num_parts: int
-    length_unit: float
+    length_units: tuple[float, ...]
     num_points: int = 2048
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
@@ -40,8 +42,15 @@ class ModelConfig:
     def __post_init__(self) -> None:
         if self.num_parts < 1:
             raise InvalidArgumentError(f"num_parts={self.num_parts} must be at least 1.")
-        if not 0 < self.length_unit < float("inf"):
-            raise InvalidArgumentError(f"length_unit={self.length_unit} must be positive, metres.")
+        if not self.categories or len(self.categories) != len(self.length_units):
+            raise InvalidArgumentError(
+                f"categories={self.categories} and length_units={self.length_units}: expected as "
+                "many of the one as of the other, one or more."
+            )
+        if not all(0 < unit < float("inf") for unit in self.length_units):
+            raise InvalidArgumentError(
+                f"length_units={self.length_units} must be positive, metres."
+            )
         if self.num_points < self.backbone.centers[0]:
             raise InvalidArgumentError(
                 f"num_points={self.num_points} must be at least {self.backbone.centers[0]}, the "
@@ -82,11 +91,16 @@ class Outputs:
 class Icaf4(nn.Module):
     """Parts, poses, joints, affordance and grasps of one object's cloud."""
 
+    length_units: Tensor
+
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
         channels = config.backbone.width_out
-        self.backbone = PointNet2(3, config.backbone)
+        # One category needs no telling.
+        told = len(config.categories) if len(config.categories) > 1 else 0
+        self.backbone = PointNet2(3 + told, config.backbone)
+        self.register_buffer("length_units", torch.tensor(config.length_units), persistent=False)
         self.segmentation = SegmentationHead(channels, config.num_parts)
         self.nocs = NocsHead(channels, config.num_parts)
         self.affordance = AffordanceHead(channels)
@@ -95,18 +109,28 @@ class Icaf4(nn.Module):
         self.grasp = GraspHead(channels, len(anchors), anchors.residual_size)
 
     def forward(
-        self, points_level: Tensor, colors: Tensor, grasp_points: Tensor | int | None = None
+        self,
+        points_level: Tensor,
+        colors: Tensor,
+        category: Tensor,
+        grasp_points: Tensor | int | None = None,
     ) -> Outputs:
         """One pass over a batch of clouds.
 
         Args:
             points_level: float32 (B, N, 3), metres, level frame, centred on the cloud.
             colors: float32 (B, N, 3) in [0, 1].
+            category: int64 (B,), into ``config.categories``.
             grasp_points: the points whose grasps are wanted: int64 (B, S), or how many of the
                 points of highest affordance; all when left out.
         """
+        given = [colors - 0.5]
+        if len(self.config.categories) > 1:
+            told = F.one_hot(category, len(self.config.categories)).to(colors.dtype)  # (B, c)
+            given.append(told[:, None].expand(-1, points_level.shape[1], -1))
+        unit = self.units_of(category)
         # (B, N, C)
-        features: Tensor = self.backbone(points_level / self.config.length_unit, colors - 0.5)
+        features: Tensor = self.backbone(points_level / unit, torch.cat(given, dim=-1))
         affordance: Tensor = self.affordance(features)
         if grasp_points is None:
             grasp_points = features.shape[1]
@@ -130,3 +154,7 @@ class Icaf4(nn.Module):
             anchors=anchors,
             residuals=residuals,
         )
+
+    def units_of(self, category: Tensor) -> Tensor:
+        """Metres of one network unit (B, 1, 1) for each cloud of a batch, by category (B,)."""
+        return self.length_units[category][:, None, None]

@@ -64,7 +64,7 @@ class Icaf4Policy:
         Raises:
             DamagedFileError: the weights are missing or damaged.
         """
-        return cls(Perception.load(weights or shipped_weights(category)))
+        return cls(Perception.load(weights or shipped_weights(category), category))
 
     def reset(self, seed: int) -> None:
         """Forgets the last episode."""

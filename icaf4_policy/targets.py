@@ -17,6 +17,7 @@ from artgym.datasets.sample import (
     JOINT_REVOLUTE,
     Sample,
 )
+from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import Anchors
 from icaf4_policy.cloud import choose_points, level_points
@@ -27,6 +28,7 @@ class Targets:
     """One sample as the network sees it, kept small. M points, G labelled surface points.
 
     Attributes:
+        category: index of the object's category.
         points_level: float32 (M, 3), metres, centred.
         colors: uint8 (M, 3).
         part: uint8 (M,).
@@ -41,6 +43,7 @@ class Targets:
         match_residual: float16 (n, r), from the anchor to its nearest successful grasp (Eq. 4).
     """
 
+    category: int
     points_level: NDArray[np.float32]
     colors: NDArray[np.uint8]
     part: NDArray[np.uint8]
@@ -76,14 +79,26 @@ def _mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDAr
     return angles
 
 
-def targets_from_sample(sample: Sample, anchors: Anchors, max_points: int) -> Targets:
+def targets_from_sample(
+    sample: Sample, categories: Sequence[str], anchors: Anchors, max_points: int
+) -> Targets:
     """Works out the targets of a sample.
 
     Args:
         sample: one view.
+        categories: those that the network is for.
         anchors: what successful grasps are matched with.
         max_points: of a longer cloud, this many points are kept, evenly in their order.
+
+    Raises:
+        InvalidArgumentError: the sample is of another category.
     """
+    category = sample.object_id.partition("/")[0]
+    if category not in categories:
+        raise InvalidArgumentError(
+            f"a sample of {sample.object_id!r} among those of {', '.join(categories)}: train a "
+            "network on the samples of its own categories."
+        )
     points_level, center_level = level_points(sample.points_camera, sample.R_level_camera)
     total = len(points_level)
     keep = np.linspace(0, total - 1, min(total, max_points)).round().astype(int)
@@ -104,6 +119,7 @@ def targets_from_sample(sample: Sample, anchors: Anchors, max_points: int) -> Ta
     row, matched, residual = row[first], matched[first], residual[first]
 
     return Targets(
+        category=list(categories).index(category),
         points_level=points_level[keep].astype(np.float32),
         colors=sample.colors[keep],
         part=sample.part[keep],
@@ -128,6 +144,7 @@ class Batch:
 
     Attributes:
         points_level: float32 (B, N, 3), metres, and colors: float32 (B, N, 3) in [0, 1].
+        category: int64 (B,).
         part: int64 (B, N).
         npcs: float32 (B, N, 3) and naocs: float32 (B, N, 3).
         affordance: int64 (B, N), 255 where unknown.
@@ -144,6 +161,7 @@ class Batch:
 
     points_level: Tensor
     colors: Tensor
+    category: Tensor
     part: Tensor
     npcs: Tensor
     naocs: Tensor
@@ -228,6 +246,7 @@ def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) ->
     return {
         "points_level": points,
         "colors": colors,
+        "category": np.array(targets.category, dtype=np.int64),
         "part": part.astype(np.int64),
         "npcs": targets.npcs[pick].astype(np.float32),
         "naocs": targets.naocs[pick].astype(np.float32),

@@ -35,7 +35,7 @@ class TrainingConfig:
     """How to train.
 
     Attributes:
-        category: "laptop", ...
+        category: one or several, which the network is then told apart by.
         epochs: passes over the training samples.
         batch_size: clouds a step.
         learning_rate: of Adam, at its highest.
@@ -58,7 +58,7 @@ class TrainingConfig:
         losses: weight of each loss.
     """
 
-    category: str
+    category: tuple[str, ...]
     epochs: int = 40
     batch_size: int = 8
     learning_rate: float = 1e-3
@@ -78,6 +78,10 @@ class TrainingConfig:
     losses: LossWeights = field(default_factory=LossWeights)
 
     def __post_init__(self) -> None:
+        if not self.category or len(set(self.category)) < len(self.category):
+            raise InvalidArgumentError(
+                f"category={self.category}: expected one or more, each of them once."
+            )
         for name in (
             "epochs",
             "batch_size",
@@ -118,25 +122,26 @@ def prepare(
     digest = hashlib.sha256()
     prepared = []
     for sample in tqdm(samples, desc=label, unit="sample", leave=False, disable=None):
-        if sample.object_id.partition("/")[0] != config.category:
-            raise InvalidArgumentError(
-                f"a sample of {sample.object_id!r} among those of {config.category!r}: train each "
-                "category on its own samples."
-            )
         digest.update(sample.object_id.encode())
         digest.update(np.ascontiguousarray(sample.points_camera).tobytes())
         digest.update(np.ascontiguousarray(sample.grasp_bits).tobytes())
-        prepared.append(targets_from_sample(sample, anchors, SPARE_POINTS * config.num_points))
+        prepared.append(
+            targets_from_sample(sample, config.category, anchors, SPARE_POINTS * config.num_points)
+        )
     return prepared, digest.hexdigest()
 
 
 def _model_config(config: TrainingConfig, targets: Sequence[Targets]) -> ModelConfig:
-    diagonals = [np.linalg.norm(np.ptp(t.points_level, axis=0)) for t in targets]
+    units = []
+    for index in range(len(config.category)):
+        clouds = [t.points_level for t in targets if t.category == index]
+        diagonals = [np.linalg.norm(np.ptp(cloud, axis=0)) for cloud in clouds]
+        units.append(round(float(np.median(diagonals)) / 2.0, 3))
     return ModelConfig(
-        category=config.category,
+        categories=config.category,
         # Objects have the first so many of their category's parts.
         num_parts=max(len(t.joint_type) for t in targets),
-        length_unit=round(float(np.median(diagonals)) / 2.0, 3),
+        length_units=tuple(units),
         num_points=config.num_points,
         anchors=config.anchors,
     )
@@ -180,8 +185,8 @@ def _validate(
     """Mean loss terms over the validation samples, and their weighted "total"."""
     sums: dict[str, float] = {}
     for batch in _batches(targets, draw, config.batch_size, seed=config.seed, epoch=None):
-        outputs = model(batch.points_level, batch.colors, batch.grasp_points)
-        terms = loss_terms(outputs, batch, model.config.length_unit)
+        outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
+        terms = loss_terms(outputs, batch, model.units_of(batch.category))
         terms["total"] = total_loss(terms, config.losses)
         for name, term in terms.items():
             sums[name] = sums.get(name, 0.0) + float(term) * len(batch.part)
@@ -216,11 +221,13 @@ def train(
     keep_freed_memory()
     training, training_digest = prepare(training_samples, config, "training samples")
     validation, validation_digest = prepare(validation_samples, config, "validation samples")
-    if not training or not validation:
-        raise InvalidArgumentError(
-            f"{len(training)} training and {len(validation)} validation samples of "
-            f"{config.category!r}: both must be there. Generate more, with both splits."
-        )
+    for index, category in enumerate(config.category):
+        counts = [sum(t.category == index for t in each) for each in (training, validation)]
+        if not all(counts):
+            raise InvalidArgumentError(
+                f"{counts[0]} training and {counts[1]} validation samples of {category!r}: both "
+                "must be there. Generate more, with both splits."
+            )
     model_config = _model_config(config, training)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
@@ -268,8 +275,9 @@ def _train_epoch(
     bar = tqdm(batches, total=steps_an_epoch, desc=label, unit="batch", leave=False, disable=None)
     for number, batch in enumerate(bar):
         with torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bfloat16"):
-            outputs = model(batch.points_level, batch.colors, batch.grasp_points)
-        loss = total_loss(loss_terms(outputs, batch, model.config.length_unit), config.losses)
+            outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
+        terms = loss_terms(outputs, batch, model.units_of(batch.category))
+        loss = total_loss(terms, config.losses)
         step = run.epoch * steps_an_epoch + number
         rate = _learning_rate(config, step, steps_an_epoch)
         run.learn(loss, rate, config.gradient_limit)

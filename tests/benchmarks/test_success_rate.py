@@ -138,7 +138,7 @@ def test_without_a_renderer_nothing_runs(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.slow
 def test_a_network_is_scored_shown_and_filmed(tmp_path, render_system):
-    model = Icaf4(ModelConfig(category="drawer", num_parts=2, length_unit=0.2))
+    model = Icaf4(ModelConfig(categories=("drawer",), num_parts=2, length_units=(0.2,)))
     save_model(tmp_path / "drawer.safetensors", model, {})
     more = ("--policy", "icaf4", "--weights", str(tmp_path))
     assert success_rate.main(arguments(tmp_path, *more)) == 0

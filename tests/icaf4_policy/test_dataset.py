@@ -20,7 +20,7 @@ DRAW = DrawConfig(num_points=128, num_anchors=len(ANCHORS), num_grasp_points=32,
 
 @pytest.fixture(scope="module")
 def items() -> TrainingItems:
-    return TrainingItems([toy_sample(i) for i in range(5)], ANCHORS, DRAW, seed=3)
+    return TrainingItems([toy_sample(i) for i in range(5)], ["toy"], ANCHORS, DRAW, seed=3)
 
 
 def batches(items, workers, epochs=2):
@@ -63,7 +63,7 @@ def test_a_sample_is_read_once():
             Counted.asked += 1
             return super().__getitem__(index)
 
-    items = TrainingItems(Counted([toy_sample(0)]), ANCHORS, DRAW)
+    items = TrainingItems(Counted([toy_sample(0)]), ["toy"], ANCHORS, DRAW)
     assert [len(items[i]["part"]) for i in (0, 1, 2)] == [128] * 3
     assert Counted.asked == 1
     with pytest.raises(IndexError, match="-1"):

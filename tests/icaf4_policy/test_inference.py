@@ -34,13 +34,14 @@ def sample(picture):
 def perception():
     torch.manual_seed(0)
     config = ModelConfig(
-        category="toy",
+        categories=("toy",),
         num_parts=2,
-        length_unit=0.25,
+        length_units=(0.25,),
         num_points=512,
         backbone=BackboneConfig(centers=(64, 16), neighbors=8),
     )
-    return Perception(model=Icaf4(config).eval(), proposals=ProposalConfig(points=64, count=16))
+    proposals = ProposalConfig(points=64, count=16)
+    return Perception(model=Icaf4(config).eval(), category="toy", proposals=proposals)
 
 
 def rng():

@@ -26,7 +26,7 @@ SURE = 50.0
 @pytest.fixture(params=["axis", "so3", "direct"])
 def batch(request):
     anchors = anchors_from_config(AnchorConfig(kind=request.param))
-    targets = [targets_from_sample(toy_sample(i), anchors, 512) for i in range(2)]
+    targets = [targets_from_sample(toy_sample(i), ["toy"], anchors, 512) for i in range(2)]
     draw = DrawConfig(num_points=256, num_anchors=len(anchors), num_grasp_points=48)
     items = [draw_item(t, draw, np.random.default_rng(i)) for i, t in enumerate(targets)]
     return collate_items(items, draw)
@@ -105,7 +105,7 @@ def test_targets_give_back_successful_grasps(kind):
     sample = toy_sample(0)
     anchors = anchors_from_config(AnchorConfig(kind=kind))
     row, R_level_grasp = successful_grasps(sample)
-    targets = targets_from_sample(sample, anchors, 512)
+    targets = targets_from_sample(sample, ["toy"], anchors, 512)
     for g in range(len(sample.grasp_part)):
         block = slice(targets.match_start[g], targets.match_start[g + 1])
         matched = targets.match_anchor[block]
@@ -124,7 +124,7 @@ def test_direct_target_is_the_most_central_success():
     sample = toy_sample(0)
     anchors = anchors_from_config(AnchorConfig(kind="direct"))
     row, R_level_grasp = successful_grasps(sample)
-    targets = targets_from_sample(sample, anchors, 512)
+    targets = targets_from_sample(sample, ["toy"], anchors, 512)
     for g in np.unique(row):
         here = R_level_grasp[row == g]
         assert targets.match_start[g + 1] - targets.match_start[g] == 1
@@ -156,7 +156,7 @@ def test_a_sample_without_any_success_can_be_trained_on():
         grasp_row=np.full_like(sample.grasp_row, -1),
     )
     draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
-    targets = targets_from_sample(hopeless, anchors_from_config(AnchorConfig()), 512)
+    targets = targets_from_sample(hopeless, ["toy"], anchors_from_config(AnchorConfig()), 512)
     batch = collate_items([draw_item(targets, draw, np.random.default_rng(0))], draw)
     terms = loss_terms(truthful_outputs(batch), batch, UNIT)
     assert total_loss(terms, LossWeights()).item() == pytest.approx(0.0, abs=1e-5)

@@ -11,13 +11,14 @@ from artgym.files import Manifest, ShardEntry
 from icaf4_policy import cli
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
+from icaf4_policy.inference import Perception
 from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.training import TrainingConfig, train
 from icaf4_policy.training_run import resume_path
 from tests.icaf4_policy.toy import toy_picture, toy_sample
 
 CONFIG = TrainingConfig(
-    category="toy",
+    category=("toy",),
     epochs=3,
     batch_size=2,
     num_points=512,
@@ -26,9 +27,9 @@ CONFIG = TrainingConfig(
     precision="float32",
 )
 SMALL = ModelConfig(
-    category="toy",
+    categories=("toy",),
     num_parts=2,
-    length_unit=0.25,
+    length_units=(0.25,),
     num_points=256,
     backbone=BackboneConfig(centers=(64, 16), neighbors=8),
 )
@@ -85,6 +86,31 @@ def test_both_splits_must_be_there(tmp_path, samples):
         train(CONFIG, samples[0], [], tmp_path / "toy.safetensors")
 
 
+def test_one_network_learns_several_categories(tmp_path, samples):
+    others = [
+        [dataclasses.replace(s, object_id=s.object_id.replace("toy", "box")) for s in each]
+        for each in samples
+    ]
+    both = [[*mine, *theirs] for mine, theirs in zip(samples, others, strict=True)]
+    config = dataclasses.replace(CONFIG, category=("toy", "box"), epochs=1)
+    weights = tmp_path / "both.safetensors"
+    train(config, *both, weights)
+    with pytest.raises(InvalidArgumentError, match=r"category: .*toy, box"):
+        Perception.load(weights)
+    seen = (samples[0][0].points_camera, samples[0][0].colors, samples[0][0].R_level_camera)
+    told = [
+        Perception.load(weights, category).predict(*seen, rng=np.random.default_rng(0))
+        for category in config.category
+    ]
+    assert not np.allclose(told[0].part_probability, told[1].part_probability)
+
+
+def test_samples_of_other_categories_are_refused(tmp_path, samples):
+    config = dataclasses.replace(CONFIG, category=("box",))
+    with pytest.raises(InvalidArgumentError, match=r"'toy/0000' among those of box"):
+        train(config, *samples, tmp_path / "box.safetensors")
+
+
 def test_train_command(tmp_path, samples, capsys):
     for split, part in zip(("train", "val"), samples, strict=True):
         folder = tmp_path / "data" / "toy" / split
@@ -119,8 +145,9 @@ def test_save_and_load_is_bit_exact(saved):
     for name, tensor in model.state_dict().items():
         assert torch.equal(tensor, loaded.state_dict()[name]), name
     cloud = torch.randn(1, 256, 3, generator=torch.Generator().manual_seed(1))
+    given = (cloud, cloud.sigmoid(), torch.tensor([0]))
     with torch.no_grad():
-        a, b = model(cloud, cloud.sigmoid()), loaded(cloud, cloud.sigmoid())
+        a, b = model(*given), loaded(*given)
     assert torch.equal(a.residuals, b.residuals)
 
 
