@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from artgym.datasets.picture_files import write_pictures
@@ -15,7 +17,12 @@ from tests.icaf4_policy.toy import toy_picture
 def pictures_of_the_toy(category, split, folder, **_):
     """In place of the renderer."""
     assert (category, split) == ("laptop", "val")
-    write_pictures(folder / "a.h5", [toy_picture(i) for i in range(3)])
+    pictures = []
+    for number in range(3):
+        picture = toy_picture(number)
+        sample = dataclasses.replace(picture.samples[0], object_id=f"laptop/{number:04d}")
+        pictures.append(dataclasses.replace(picture, samples=(sample,)))
+    write_pictures(folder / "a.h5", pictures)
     shard = ShardEntry.of(folder / "a.h5", 3)
     manifest = Manifest(config={}, planned=1, shards=(shard,))
     manifest.write(folder)
