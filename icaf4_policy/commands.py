@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from artgym.datasets.authors import AuthorsFolder, AuthorsSample
 from artgym.datasets.picture_files import SampleFolder
+from artgym.datasets.sample import Sample
 from artgym.errors import InvalidArgumentError
 from icaf4_policy import drawing
 from icaf4_policy.checkpoint import description_path
@@ -20,24 +22,51 @@ from icaf4_policy.inference import Perception
 from icaf4_policy.training import TrainingConfig
 from icaf4_policy.training import train as run_training
 
+Samples = Iterable[Sample | AuthorsSample]
+
+#: Of the authors' training objects, every so many chooses the weights: theirs for that are those
+#: of the test.
+_AUTHORS_VALIDATION = 8
+
 
 def train(config: TrainingConfig, *, data: Path, out: Path, threads: int = 1) -> int:
     """Train on generated samples. Interrupted, the same command goes on where it stopped.
 
     Args:
         config: how to train.
-        data: folder with `{category}/train` and `{category}/val`, made by `artgym generate`.
+        data: folder with `{category}/train` and `{category}/val`, made by `artgym generate`; or
+            one of the authors' with `{category}/train.txt` and the listed files, of one category,
+            where every eighth object of the list chooses the weights.
         out: weights to write, ending in .safetensors.
         threads: of torch; results are repeatable for the same number of them.
     """
     torch.set_num_threads(threads)
-    training, validation = (
-        chain.from_iterable(SampleFolder(data / category / split) for category in config.category)
-        for split in ("train", "val")
-    )
-    run_training(config, training, validation, out)
+    run_training(config, *_training_samples(data, config.category), out)
     print(f"wrote {out} and {description_path(out)}")
     return 0
+
+
+def _training_samples(data: Path, categories: Sequence[str]) -> tuple[Samples, Samples]:
+    """Those to train with, and those of other objects that choose the weights."""
+    listed = [c for c in categories if (data / c / "train.txt").is_file()]
+    if not listed:
+        training, validation = (
+            chain.from_iterable(SampleFolder(data / category / split) for category in categories)
+            for split in ("train", "val")
+        )
+        return training, validation
+    if len(categories) > 1:
+        raise InvalidArgumentError(
+            f"category={', '.join(categories)}: {data / listed[0]} holds the authors' data, which "
+            "is trained with one category at a time."
+        )
+    samples = AuthorsFolder(data, listed[0], "train")
+    numbers = [sample.urdf_id for sample in samples]
+    chosen = set(sorted(set(numbers))[::_AUTHORS_VALIDATION])
+    return (
+        (samples[i] for i, number in enumerate(numbers) if number not in chosen),
+        (samples[i] for i, number in enumerate(numbers) if number in chosen),
+    )
 
 
 def predict(

@@ -13,9 +13,11 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
+from artgym.datasets.authors import AuthorsSample
 from artgym.datasets.sample import Sample
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
+from icaf4_policy.authors_targets import targets_from_authors
 from icaf4_policy.dataset import SPARE_POINTS
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig
@@ -106,12 +108,13 @@ class TrainingConfig:
 
 
 def prepare(
-    samples: Iterable[Sample], config: TrainingConfig, label: str
+    samples: Iterable[Sample | AuthorsSample], config: TrainingConfig, label: str
 ) -> tuple[list[Targets], str]:
     """Targets of all samples, and a digest of what went in.
 
     Args:
-        samples: decoded one at a time if they are lazy.
+        samples: decoded one at a time if they are lazy; those of the authors do not tell their
+            category, and are of the only one.
         config: of the training.
         label: what the progress bar says.
 
@@ -121,13 +124,17 @@ def prepare(
     anchors = anchors_from_config(config.anchors)
     digest = hashlib.sha256()
     prepared = []
+    most = SPARE_POINTS * config.num_points
     for sample in tqdm(samples, desc=label, unit="sample", leave=False, disable=None):
-        digest.update(sample.object_id.encode())
+        if isinstance(sample, AuthorsSample):
+            name, grasps = str(sample.urdf_id), sample.R_camera_grasps
+            prepared.append(targets_from_authors(sample, anchors, most))
+        else:
+            name, grasps = sample.object_id, sample.grasp_bits
+            prepared.append(targets_from_sample(sample, config.category, anchors, most))
+        digest.update(name.encode())
         digest.update(np.ascontiguousarray(sample.points_camera).tobytes())
-        digest.update(np.ascontiguousarray(sample.grasp_bits).tobytes())
-        prepared.append(
-            targets_from_sample(sample, config.category, anchors, SPARE_POINTS * config.num_points)
-        )
+        digest.update(np.ascontiguousarray(grasps).tobytes())
     return prepared, digest.hexdigest()
 
 
@@ -195,8 +202,8 @@ def _validate(
 
 def train(
     config: TrainingConfig,
-    training_samples: Iterable[Sample],
-    validation_samples: Iterable[Sample],
+    training_samples: Iterable[Sample | AuthorsSample],
+    validation_samples: Iterable[Sample | AuthorsSample],
     weights: Path,
     *,
     stop_after_epoch: int | None = None,
