@@ -29,7 +29,9 @@ Samples = Iterable[Sample | AuthorsSample]
 _AUTHORS_VALIDATION = 8
 
 
-def train(config: TrainingConfig, *, data: Path, out: Path, threads: int = 1) -> int:
+def train(
+    config: TrainingConfig, *, data: Path, out: Path, log: Path | None = None, threads: int = 1
+) -> int:
     """Train on generated samples. Interrupted, the same command goes on where it stopped.
 
     Args:
@@ -38,10 +40,11 @@ def train(config: TrainingConfig, *, data: Path, out: Path, threads: int = 1) ->
             one of the authors' with `{category}/train.txt` and the listed files, of one category,
             where every eighth object of the list chooses the weights.
         out: weights to write, ending in .safetensors.
+        log: folder for TensorBoard.
         threads: of torch; results are repeatable for the same number of them.
     """
     torch.set_num_threads(threads)
-    run_training(config, *_training_samples(data, config.category), out)
+    run_training(config, *_training_samples(data, config.category), out, log=log)
     print(f"wrote {out} and {description_path(out)}")
     return 0
 

@@ -207,6 +207,7 @@ def train(
     weights: Path,
     *,
     stop_after_epoch: int | None = None,
+    log: Path | None = None,
 ) -> Icaf4:
     """Trains a network and writes the weights that validate best.
 
@@ -220,6 +221,7 @@ def train(
         weights: path of the result, ``.safetensors``; its description lies beside it.
         stop_after_epoch: leave after this many epochs, as if interrupted there; the next call
             goes on.
+        log: folder for TensorBoard.
 
     Returns:
         The network with the weights that were written, in evaluation mode; after an early stop,
@@ -264,6 +266,7 @@ def train(
             "validation_samples": len(validation),
             "validation_sha256": validation_digest,
         },
+        log=log,
     )
     return model
 

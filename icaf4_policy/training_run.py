@@ -7,7 +7,8 @@ import hashlib
 import json
 import math
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.errors import DamagedFileError, InvalidArgumentError, MissingDependencyError
 from icaf4_policy.checkpoint import load_tensors, save_model, save_tensors
 
 
@@ -49,6 +50,22 @@ def resume_path(weights: Path) -> Path:
     return weights.with_suffix(".resume.safetensors")
 
 
+def _require_tensorboard() -> None:
+    if find_spec("tensorboard") is None:
+        raise MissingDependencyError(
+            "log: TensorBoard is not installed: pip install 'artgym[train]', or go without --log."
+        )
+
+
+def _write_scalars(folder: Path, values: Mapping[str, float], epoch: int) -> None:
+    """Adds values to a TensorBoard log, whole on disk when this returns."""
+    from torch.utils.tensorboard import SummaryWriter
+
+    with SummaryWriter(str(folder)) as writer:
+        for name, value in values.items():
+            writer.add_scalar(name, value, epoch)
+
+
 class TrainingRun:
     """The state of a run between two epochs, in memory and on disk.
 
@@ -75,6 +92,8 @@ class TrainingRun:
         self.best: dict[str, Tensor] = {}
         self.best_epoch = -1
         self.history: list[dict[str, float]] = []
+        #: Of the steps of this epoch.
+        self._losses: list[float] = []
 
     def learn(self, loss: Tensor, learning_rate: float, gradient_limit: float) -> None:
         """One step down the gradient of a loss.
@@ -98,6 +117,7 @@ class TrainingRun:
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), gradient_limit)
         self.optimizer.step()
+        self._losses.append(loss.item())
 
     def consider(self, validation: dict[str, float]) -> None:
         """Notes a validation, and keeps the weights if it is the best so far."""
@@ -155,6 +175,7 @@ class TrainingRun:
         train_epoch: Callable[[], None],
         validate: Callable[[], dict[str, float]],
         facts: dict[str, Any],
+        log: Path | None = None,
     ) -> None:
         """Goes through all epochs that are left, and writes the weights that validate best.
 
@@ -168,19 +189,30 @@ class TrainingRun:
             train_epoch: trains for one epoch, which is number ``epoch``, counted from 0.
             validate: scores the model.
             facts: JSON-able facts for the result's description.
+            log: folder for TensorBoard: the mean loss of each epoch and every validation.
+
+        Raises:
+            MissingDependencyError: a log is wanted, and TensorBoard is not installed.
         """
+        if log is not None:
+            _require_tensorboard()
         if resume_path(weights).exists():
             self.load(resume_path(weights))
         last = epochs if stop_after_epoch is None else min(stop_after_epoch, epochs)
         while self.epoch < last:
             self.model.train()
+            self._losses.clear()
             train_epoch()
             self.epoch += 1
+            values = {"training/loss": sum(self._losses) / max(len(self._losses), 1)}
             if self.epoch % validate_every == 0 or self.epoch == epochs:
                 self.model.eval()
                 self.consider(validate())
                 shown = {name: round(value, 4) for name, value in self.history[-1].items()}
                 tqdm.write(f"validation {shown}")
+                values |= {f"validation/{name}": value for name, value in shown.items()}
+            if log is not None:
+                _write_scalars(log, values, self.epoch)
             self.save(resume_path(weights))
         if self.best:
             self.model.load_state_dict(self.best)

@@ -6,9 +6,9 @@ import pytest
 import torch
 
 from artgym.datasets.picture_files import write_pictures
-from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.errors import DamagedFileError, InvalidArgumentError, MissingDependencyError
 from artgym.files import Manifest, ShardEntry
-from icaf4_policy import cli
+from icaf4_policy import cli, training_run
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
 from icaf4_policy.inference import Perception
@@ -50,6 +50,19 @@ def test_interrupted_training_ends_with_the_same_bytes(tmp_path, samples):
     assert not resume_path(broken).exists()
     assert broken.read_bytes() == straight.read_bytes()
     assert description_path(broken).read_text() == description_path(straight).read_text()
+
+
+def test_a_log_has_every_epoch(tmp_path, samples, monkeypatch):
+    events = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    train(CONFIG, *samples, tmp_path / "toy.safetensors", stop_after_epoch=2, log=tmp_path / "log")
+    train(CONFIG, *samples, tmp_path / "toy.safetensors", log=tmp_path / "log")
+    log = events.EventAccumulator(str(tmp_path / "log"))
+    log.Reload()
+    for name in ("training/loss", "validation/total"):
+        assert [event.step for event in log.Scalars(name)] == [1, 2, 3]
+    monkeypatch.setattr(training_run, "find_spec", lambda name: None)
+    with pytest.raises(MissingDependencyError, match=r"artgym\[train\]"):
+        train(CONFIG, *samples, tmp_path / "other.safetensors", log=tmp_path)
 
 
 def test_global_random_state_is_left_alone_and_not_read(tmp_path, samples):
