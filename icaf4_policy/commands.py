@@ -30,7 +30,13 @@ _AUTHORS_VALIDATION = 8
 
 
 def train(
-    config: TrainingConfig, *, data: Path, out: Path, log: Path | None = None, threads: int = 1
+    config: TrainingConfig,
+    *,
+    data: Path,
+    out: Path,
+    log: Path | None = None,
+    device: str = "auto",
+    threads: int = 1,
 ) -> int:
     """Train on generated samples. Interrupted, the same command goes on where it stopped.
 
@@ -41,12 +47,30 @@ def train(
             where every eighth object of the list chooses the weights.
         out: weights to write, ending in .safetensors.
         log: folder for TensorBoard.
+        device: cpu, cuda, cuda:1, ...; auto takes a GPU if there is one. Several GPUs train several
+            networks at once, a command each. Only the CPU gives the same bytes again.
         threads: of torch; results are repeatable for the same number of them.
     """
     torch.set_num_threads(threads)
-    run_training(config, *_training_samples(data, config.category), out, log=log)
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = _usable(device)
+    run_training(config, *_training_samples(data, config.category), out, log=log, device=device)
     print(f"wrote {out} and {description_path(out)}")
     return 0
+
+
+def _usable(device: str) -> str:
+    """A device's name, once something could be put there."""
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).splitlines()[0]
+        raise InvalidArgumentError(
+            f"device={device!r} cannot be used ({reason}): expected cpu, or cuda where torch finds "
+            "a GPU."
+        ) from error
+    return device
 
 
 def _training_samples(data: Path, categories: Sequence[str]) -> tuple[Samples, Samples]:

@@ -191,7 +191,9 @@ def _validate(
 ) -> dict[str, float]:
     """Mean loss terms over the validation samples, and their weighted "total"."""
     sums: dict[str, float] = {}
-    for batch in _batches(targets, draw, config.batch_size, seed=config.seed, epoch=None):
+    device = model.length_units.device
+    for drawn in _batches(targets, draw, config.batch_size, seed=config.seed, epoch=None):
+        batch = drawn.to(device)
         outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
         terms = loss_terms(outputs, batch, model.units_of(batch.category))
         terms["total"] = total_loss(terms, config.losses)
@@ -208,6 +210,7 @@ def train(
     *,
     stop_after_epoch: int | None = None,
     log: Path | None = None,
+    device: str = "cpu",
 ) -> Icaf4:
     """Trains a network and writes the weights that validate best.
 
@@ -222,6 +225,7 @@ def train(
         stop_after_epoch: leave after this many epochs, as if interrupted there; the next call
             goes on.
         log: folder for TensorBoard.
+        device: where the network is trained, as torch calls it: "cpu", "cuda", "cuda:1".
 
     Returns:
         The network with the weights that were written, in evaluation mode; after an early stop,
@@ -240,7 +244,7 @@ def train(
     model_config = _model_config(config, training)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
-        model = Icaf4(model_config)
+        model = Icaf4(model_config).to(device)
     optimizer = torch.optim.Adam(
         model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
     )
@@ -268,7 +272,7 @@ def train(
         },
         log=log,
     )
-    return model
+    return model.cpu()
 
 
 def _train_epoch(
@@ -283,8 +287,10 @@ def _train_epoch(
     batches = _batches(targets, draw, config.batch_size, seed=config.seed, epoch=run.epoch)
     label = f"epoch {run.epoch + 1}/{config.epochs}"
     bar = tqdm(batches, total=steps_an_epoch, desc=label, unit="batch", leave=False, disable=None)
-    for number, batch in enumerate(bar):
-        with torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bfloat16"):
+    device, low = model.length_units.device, config.precision == "bfloat16"
+    for number, drawn in enumerate(bar):
+        batch = drawn.to(device)
+        with torch.autocast(device.type, dtype=torch.bfloat16, enabled=low):
             outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
         terms = loss_terms(outputs, batch, model.units_of(batch.category))
         loss = total_loss(terms, config.losses)

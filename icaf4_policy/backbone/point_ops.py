@@ -157,6 +157,8 @@ def neighborhoods(
 ) -> Neighborhoods:
     """Samples two levels of centers and finds every neighbour the backbone needs.
 
+    The search runs on the CPU; its result lies where the points do.
+
     Args:
         points: float32 (B, N, 3), network units.
         counts: centers at each level, n1 > n2 >= 3.
@@ -187,4 +189,6 @@ def neighborhoods(
         found["weights_up1"].append(weights_up1)
         found["up2"].append(up2 + b * n2)
         found["weights_up2"].append(weights_up2)
-    return Neighborhoods(**{name: torch.from_numpy(np.stack(v)) for name, v in found.items()})
+    return Neighborhoods(
+        **{name: torch.from_numpy(np.stack(v)).to(points.device) for name, v in found.items()}
+    )

@@ -8,7 +8,7 @@ import torch
 from artgym.datasets.picture_files import write_pictures
 from artgym.errors import DamagedFileError, InvalidArgumentError, MissingDependencyError
 from artgym.files import Manifest, ShardEntry
-from icaf4_policy import cli, training_run
+from icaf4_policy import cli, commands, training_run
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
 from icaf4_policy.inference import Perception
@@ -122,6 +122,23 @@ def test_samples_of_other_categories_are_refused(tmp_path, samples):
     config = dataclasses.replace(CONFIG, category=("box",))
     with pytest.raises(InvalidArgumentError, match=r"'toy/0000' among those of box"):
         train(config, *samples, tmp_path / "box.safetensors")
+
+
+def test_a_device_that_is_not_there_is_named(tmp_path, capsys):
+    with pytest.raises(InvalidArgumentError, match=r"device='cuda:99' cannot be used"):
+        commands.train(CONFIG, data=tmp_path, out=tmp_path / "toy.safetensors", device="cuda:99")
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU here")
+def test_a_gpu_learns_the_same(tmp_path, samples):
+    here, there = tmp_path / "cpu.safetensors", tmp_path / "gpu.safetensors"
+    train(CONFIG, *samples, here)
+    train(CONFIG, *samples, there, device="cuda")
+    losses = [
+        [entry["total"] for entry in load_model(weights)[1]["training"]["validation"]]
+        for weights in (here, there)
+    ]
+    np.testing.assert_allclose(losses[1], losses[0], rtol=0.05)
 
 
 def test_train_command(tmp_path, samples, capsys):
