@@ -273,6 +273,35 @@ def _known(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
+def pose_speed_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``pose_speed.json``, a number of parts and a way to fit a line."""
+    lines = [
+        "| parts | fit | ms: median, 99 of 100 below | rotation error, deg "
+        "| translation error, % of diameter | the same on the optimizer's clouds "
+        "| times the optimizer's speed |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for parts, row in [*result["rows"].items(), ("all", result["all"])]:
+        for way, label in result["ways"].items():
+            here, beside = row[way], row[way]["beside_reference"]
+            lines.append(
+                f"| {parts} | {label} | {here['ms']['median']:,.2f}, {here['ms']['p99']:,.2f} "
+                f"| {here['rotation_deg']:.2f} | {100 * here['translation']:.2f} "
+                f"| {beside['rotation_deg']:.2f} deg, {100 * beside['translation']:.2f} % "
+                f"| {beside['times']:,.0f} |"
+            )
+    every = result["all"]
+    lines += [
+        "",
+        f"{every['alone']['clouds']} synthetic clouds of 2,048 points, up to 40 % of the "
+        "coordinates anything, the others off as a network's are; "
+        f"{every['reference']['clouds']} of them by the optimizer too "
+        "(`benchmarks/constrained_fit.py`, after ANCSH), which is told the joint's type. Processor "
+        "time of one thread; errors are means, the ratio is the median over clouds.",
+    ]
+    return "\n".join(lines)
+
+
 def rays_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``rays.json``, an object a line."""
     lines = [
@@ -316,13 +345,14 @@ BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "env_speed": env_speed_block,
     "labels": labels_block,
     "label_speed": label_speed_block,
+    "pose_speed": pose_speed_block,
     "rays": rays_block,
     "rl_baselines": rl_baselines_block,
 }
 
 
 #: What makes a result whose module has several.
-_COMMANDS = {"env_speed": "speed env", "label_speed": "speed labels"}
+_COMMANDS = {"env_speed": "speed env", "label_speed": "speed labels", "pose_speed": "speed poses"}
 
 
 def filled(page: str, results: Path = RESULTS_FOLDER) -> str:

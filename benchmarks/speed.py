@@ -1,4 +1,4 @@
-"""How fast is it? Run ``python -m benchmarks.speed env|labels|datasets|perception --help``."""
+"""How fast is it? ``python -m benchmarks.speed env|labels|datasets|poses|perception --help``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 
 from artgym.errors import UnknownNameError
-from benchmarks import dataset_speed, env_speed, label_speed, perception_speed
+from benchmarks import dataset_speed, env_speed, label_speed, perception_speed, pose_speed
 
 #: What can be timed: the functions take the command line that follows the word.
 QUESTIONS: Mapping[str, Callable[[Sequence[str]], int]] = {
@@ -14,6 +14,7 @@ QUESTIONS: Mapping[str, Callable[[Sequence[str]], int]] = {
     "labels": label_speed.main,
     "datasets": dataset_speed.main,
     "perception": perception_speed.main,
+    "poses": pose_speed.main,
 }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.collisions import CollisionConfig, hand_is_free
+from icaf4_policy.joint_consistency import ConsistencyConfig, consistent_fits
 from icaf4_policy.model import Icaf4, Outputs
 from icaf4_policy.pose_fitting import PoseFit, fit_pose
 from icaf4_policy.tabletop import MIN_OBJECT_POINTS, ObjectView, segment_object
@@ -152,11 +153,14 @@ class Perception:
         model: in evaluation mode.
         category: of the objects to look at, one of those that the network is for.
         proposals: how grasps are ranked.
+        consistency: how the boxes are made to agree with the joints; None leaves each part the
+            fit of its own points.
     """
 
     model: Icaf4
     category: str
     proposals: ProposalConfig = field(default_factory=ProposalConfig)
+    consistency: ConsistencyConfig | None = field(default_factory=ConsistencyConfig)
 
     def __post_init__(self) -> None:
         if self.category not in self.model.config.categories:
@@ -318,8 +322,6 @@ class Perception:
         naocs = outputs.naocs[0].numpy()[rows, part].astype(float)
         affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
 
-        part_boxes: list[PoseFit | None] = []
-        object_boxes: list[PoseFit | None] = []
         joints = []
         type_log = outputs.joint_type[0].log_softmax(dim=-1).numpy()
         axis_camera = outputs.joint_axis[0].numpy() @ R_level_camera
@@ -328,12 +330,8 @@ class Perception:
         for k in range(num_parts):
             on_part = part == k
             if on_part.sum() < MIN_PART_POINTS:
-                part_boxes.append(None)
-                object_boxes.append(None)
                 joints.append(_NO_JOINT)
                 continue
-            part_boxes.append(fit_pose(npcs[on_part], points[on_part], rng))
-            object_boxes.append(fit_pose(naocs[on_part], points[on_part], rng))
             joints.append(
                 _joint_from_votes(
                     type_log[on_part],
@@ -351,13 +349,39 @@ class Perception:
             npcs=npcs,
             naocs=naocs,
             affordance=affordance,
-            part_boxes=tuple(part_boxes),
-            object_boxes=tuple(object_boxes),
+            part_boxes=self._boxes(npcs, points, part, joints, rng),
+            object_boxes=self._boxes(naocs, points, part, joints, rng),
             joints=tuple(joints),
             grasps=self._ranked_grasps(
                 outputs, points, part, affordance, R_level_camera, table_camera
             ),
             R_level_camera=R_level_camera,
+        )
+
+    def _boxes(
+        self,
+        nocs: Array,
+        points: Array,
+        part: NDArray[np.int64],
+        joints: Sequence[JointEstimate],
+        rng: np.random.Generator,
+    ) -> tuple[PoseFit | None, ...]:
+        """One box a part, ``None`` where it was not found."""
+        places = [np.flatnonzero(part == k) for k in range(len(joints))]
+        nocs_of_parts, points_of_parts = [nocs[i] for i in places], [points[i] for i in places]
+        fits = tuple(
+            fit_pose(x, y, rng) if len(x) >= MIN_PART_POINTS else None
+            for x, y in zip(nocs_of_parts, points_of_parts, strict=True)
+        )
+        if self.consistency is None:
+            return fits
+        return consistent_fits(
+            fits,
+            nocs_of_parts,
+            points_of_parts,
+            [joint.joint_type for joint in joints],
+            [joint.axis_camera for joint in joints],
+            self.consistency,
         )
 
     def _ranked_grasps(

@@ -15,6 +15,7 @@ from icaf4_policy.checkpoint import save_model
 from icaf4_policy.drawing import read_rgb
 from icaf4_policy.evaluation import evaluate_sample
 from icaf4_policy.inference import Perception, ProposalConfig, _joint_from_votes, diverse
+from icaf4_policy.joint_consistency import consistent_fits
 from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.tabletop import fit_table, segment_object
 from tests.icaf4_policy.toy import toy_picture
@@ -124,6 +125,24 @@ def test_prediction_is_complete_and_repeatable(perception, picture):
     assert ((grasps.scores >= 0) & (grasps.scores <= 1)).all()
     np.testing.assert_allclose(np.linalg.det(grasps.R_camera_grasp), 1.0)
     assert set(grasps.of_part(1).parts) <= {1}
+
+
+def test_boxes_are_made_to_agree_with_the_joints_unless_told_not_to(perception, sample):
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    agreed = perception.predict(*seen, rng=rng())
+    alone = dataclasses.replace(perception, consistency=None).predict(*seen, rng=rng())
+    places = [agreed.part == k for k in range(2)]
+    expected = consistent_fits(
+        alone.part_boxes,
+        [agreed.npcs[on_part] for on_part in places],
+        [agreed.points_camera[on_part] for on_part in places],
+        [joint.joint_type for joint in agreed.joints],
+        [joint.axis_camera for joint in agreed.joints],
+    )
+    for box, same in zip(agreed.part_boxes, expected, strict=True):
+        assert (box is None) == (same is None)
+        if box is not None:
+            np.testing.assert_array_equal(box.T_camera_box, same.T_camera_box)
 
 
 def test_proposals_differ_from_one_another(perception, picture):
