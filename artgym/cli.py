@@ -287,6 +287,7 @@ def generate(
     category: tuple[str, ...] = (),
     split: tuple[str, ...] = ("train", "val", "test"),
     labels: Path | None = None,
+    objects: int | None = None,
     views: int = 8,
     scenes: tuple[int, int, int] = (640, 64, 96),
     camera_size: tuple[int, int] = (640, 480),
@@ -305,6 +306,8 @@ def generate(
         category: categories; by default those of the paper's set.
         split: train, val, test; objects are in one of them.
         labels: folder that `artgym annotate` wrote; by default the labels inside the package.
+        objects: of each category and split; those beyond the labelled ones are pictured once a
+            joint state, and nothing is known of their grasps. By default the labelled ones.
         views: of artimage, pictures of each labelled joint state.
         scenes: of reartmix, pictures of the train, val and test split.
         camera_size: width and height, pixels.
@@ -331,6 +334,7 @@ def generate(
     )
     counts: dict[str, int] = dict(zip(("train", "val", "test"), scenes, strict=True))
     options: dict[str, Any] = {
+        "objects": objects,
         "config": config,
         "label_root": labels,
         "workers": workers,

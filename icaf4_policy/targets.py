@@ -73,6 +73,8 @@ def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.flo
 def _mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDArray[np.floating]:
     """Mean angle (n,) from each grasp (n, 3, 3) to the others of its point, ``row`` ascending."""
     angles = np.empty(len(row))
+    if not len(row):
+        return angles
     for group in np.split(np.arange(len(row)), np.flatnonzero(np.diff(row)) + 1):
         here = R_grasps[group]
         angles[group] = grasp_angle(here[:, None], here[None]).mean(axis=1)

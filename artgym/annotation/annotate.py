@@ -139,16 +139,31 @@ def annotate(
         InvalidArgumentError: no camera sees a movable part in some joint state.
     """
     obj = catalog.load(object_id)
-    rng = np.random.default_rng([config.seed, zlib.crc32(object_id.encode())])
-    intervals = [catalog.category_of(obj).start_fraction] * config.start_states
-    intervals += [(0.0, 1.0)] * config.open_states
-    fractions = np.array([rng.uniform(*each, len(obj.joints)) for each in intervals])
+    rng = _generator(object_id, config)
+    fractions = _joint_states(obj, config, rng)
     states = [
         _annotate_state(obj, state, positions_at(obj, each), config, rng)
         for state, each in enumerate(fractions)
     ]
     columns = [np.concatenate(column) for column in zip(*states, strict=True)]
     return dict(zip(_ARRAYS, [fractions, *columns], strict=True))
+
+
+def joint_states(object_id: str, config: AnnotationConfig = AnnotationConfig()) -> Array:
+    """Open fractions (S, K - 1) of an object's parts in the states that ``annotate`` labels."""
+    return _joint_states(catalog.load(object_id), config, _generator(object_id, config))
+
+
+def _generator(object_id: str, config: AnnotationConfig) -> np.random.Generator:
+    return np.random.default_rng([config.seed, zlib.crc32(object_id.encode())])
+
+
+def _joint_states(
+    obj: ArticulatedObject, config: AnnotationConfig, rng: np.random.Generator
+) -> Array:
+    intervals = [catalog.category_of(obj).start_fraction] * config.start_states
+    intervals += [(0.0, 1.0)] * config.open_states
+    return np.array([rng.uniform(*each, len(obj.joints)) for each in intervals])
 
 
 def _annotate_state(
@@ -304,9 +319,7 @@ def read_labels(object_id: str, root: Path | None = None) -> Labels:
     Raises:
         DamagedFileError: the file is missing or damaged.
     """
-    category, _, _ = object_id.partition("/")
-    folder = labels_folder(category, catalog.split_of(object_id), root)
-    path = folder / label_file_name(object_id)
+    path = _label_path(object_id, root)
     arrays, _ = read_arrays(path)
     if set(arrays) != set(_ARRAYS):
         raise DamagedFileError(
@@ -314,6 +327,17 @@ def read_labels(object_id: str, root: Path | None = None) -> Labels:
             "label file of this version. Make it again with `artgym annotate`."
         )
     return Labels(object_id=object_id, **arrays)
+
+
+def is_labelled(object_id: str, root: Path | None = None) -> bool:
+    """Whether an object has labels; shipped ones by default."""
+    return _label_path(object_id, root).is_file()
+
+
+def _label_path(object_id: str, root: Path | None) -> Path:
+    category, _, _ = object_id.partition("/")
+    folder = labels_folder(category, catalog.split_of(object_id), root)
+    return folder / label_file_name(object_id)
 
 
 def labelled_categories(root: Path | None = None) -> tuple[str, ...]:

@@ -1,12 +1,14 @@
 """Makes labelled RGB-D pictures: of one object, or of several on one table.
 
 ``artimage`` and ``reartmix`` are sets like the paper's ArtImage and ReArtMix (Section 5.1). Objects
-stand in the joint states in which they were labelled, so that every picture has grasps.
+stand in the joint states in which they were labelled, so that every picture has grasps; others can
+be pictured without.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -18,7 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-from artgym.annotation.annotate import labelled_ids, positions_at, read_labels
+from artgym.annotation.annotate import (
+    is_labelled,
+    joint_states,
+    labelled_ids,
+    positions_at,
+    read_labels,
+)
 from artgym.annotation.filter import FilterConfig, Verdict, judge
 from artgym.datasets.depth_noise import sensed_depth
 from artgym.datasets.picture_files import write_pictures
@@ -37,7 +45,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.files import Manifest
 from artgym.geometry import transforms
 from artgym.geometry.camera import points_from_depth
-from artgym.geometry.grasps import NUM_APPROACHES, NUM_ROLLS
+from artgym.geometry.grasps import NUM_APPROACHES, NUM_CANDIDATES, NUM_ROLLS
 from artgym.jobs import ShardTask, run_shards
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject, canonical_box
@@ -78,6 +86,7 @@ class GenerationConfig:
 
     Attributes:
         views: pictures of each labelled joint state of a single object.
+        plain_views: pictures of each joint state of an object without labels.
         camera_size: (width, height), pixels.
         max_points: object points kept of a picture.
         min_points: a picture with fewer is drawn again.
@@ -93,6 +102,7 @@ class GenerationConfig:
     """
 
     views: int = 8
+    plain_views: int = 1
     camera_size: tuple[int, int] = (640, 480)
     max_points: int = 4096
     min_points: int = 600
@@ -105,8 +115,8 @@ class GenerationConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        counts = {"views": self.views, "camera_size": min(self.camera_size), "seed": self.seed + 1}
-        for name in ("max_points", "min_points", "min_scene_points"):
+        counts = {"camera_size": min(self.camera_size), "seed": self.seed + 1}
+        for name in ("views", "plain_views", "max_points", "min_points", "min_scene_points"):
             counts[name] = getattr(self, name)
         for name, count in counts.items():
             if count < 1:
@@ -139,10 +149,33 @@ class _CarriedLabels:
     affordance: NDArray[np.uint8]
 
 
+#: Of an object without labels.
+_NO_LABELS = _CarriedLabels(
+    points_part=np.zeros((0, 3), dtype=np.float32),
+    normals_part=np.zeros((0, 3), dtype=np.float32),
+    part=np.zeros(0, dtype=np.uint8),
+    bits=np.zeros((0, math.ceil(NUM_CANDIDATES / 8)), dtype=np.uint8),
+    affordance=np.zeros(0, dtype=np.uint8),
+)
+
+
+@functools.lru_cache(maxsize=512)
+def _states(object_id: str, label_root: Path | None) -> Array:
+    """Open fractions (S, K - 1) of the states an object is pictured in: the labelled ones, if any.
+
+    Without labels, they are those that would be labelled.
+    """
+    if is_labelled(object_id, label_root):
+        return read_labels(object_id, label_root).fractions
+    return joint_states(object_id)
+
+
 @functools.lru_cache(maxsize=512)
 def _carried_labels(
     object_id: str, state: int, config: GenerationConfig, label_root: Path | None
 ) -> _CarriedLabels:
+    if not is_labelled(object_id, label_root):
+        return _NO_LABELS
     obj, labels = catalog.load(object_id), read_labels(object_id, label_root)
     rows = np.flatnonzero(labels.state == state)
     success = labels.success[rows]
@@ -171,7 +204,7 @@ def _carried_labels(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _LabelledObject:
-    """An object in a labelled joint state, somewhere in the world."""
+    """An object in a joint state, somewhere in the world, and what its labels say there."""
 
     model: ArticulatedObject
     fractions: Array
@@ -197,7 +230,7 @@ def _labelled_object(
 ) -> _LabelledObject:
     return _LabelledObject(
         model=catalog.load(object_id),
-        fractions=read_labels(object_id, label_root).fractions[state],
+        fractions=_states(object_id, label_root)[state],
         labels=_carried_labels(object_id, state, config, label_root),
         T_world_object=T_world_object,
     )
@@ -209,17 +242,18 @@ def _labelled_object(
 def make_pictures(
     object_id: str, config: GenerationConfig = GenerationConfig(), label_root: Path | None = None
 ) -> list[Picture]:
-    """All pictures of one labelled object, a function of id, labels and config alone.
+    """All pictures of one object, a function of id, labels and config alone.
 
     Raises:
-        DamagedFileError: the object has no readable labels.
+        DamagedFileError: the object's labels cannot be read.
         InvalidArgumentError: the pictures are too small to show enough of it.
         RendererUnavailableError: no device here can render.
     """
+    views = config.views if is_labelled(object_id, label_root) else config.plain_views
     return [
         _object_picture(object_id, state, view, config, label_root)
-        for state in range(len(read_labels(object_id, label_root).fractions))
-        for view in range(config.views)
+        for state in range(len(_states(object_id, label_root)))
+        for view in range(views)
     ]
 
 
@@ -252,7 +286,7 @@ def make_scenes(
     """Scenes ``first`` to ``first + count - 1`` of a set whose objects are drawn from ``ids``.
 
     Raises:
-        DamagedFileError: an object has no readable labels.
+        DamagedFileError: the labels of an object cannot be read.
         InvalidArgumentError: no scene could be drawn that shows enough of every object.
         RendererUnavailableError: no device here can render.
     """
@@ -293,7 +327,7 @@ def _drawn_objects(
         if len(taken) == count:
             return
         object_id = str(rng.choice(by_category[str(rng.choice(categories))]))
-        states = len(read_labels(object_id, label_root).fractions)
+        states = len(_states(object_id, label_root))
         shown = _labelled_object(
             object_id,
             int(rng.integers(states)),
@@ -527,13 +561,17 @@ def generate_artimage(
     split: catalog.Split,
     folder: Path,
     *,
+    objects: int | None = None,
     config: GenerationConfig = GenerationConfig(),
     label_root: Path | None = None,
     workers: int = 1,
     backend: str = "loky",
     progress: bool = True,
 ) -> Manifest:
-    """Makes one shard for each labelled object of a split; goes on where it stopped.
+    """Makes one shard for each object of a split; goes on where it stopped.
+
+    Pictured are the labelled objects and, if there are less than ``objects``, as many of the first
+    ones without labels: parts, poses and joints can be learnt from these too.
 
     Raises:
         InvalidArgumentError: no labels there, or the folder was made with another configuration.
@@ -541,7 +579,7 @@ def generate_artimage(
     """
     tasks = [
         ShardTask(name=f"{i.replace('/', '_')}.h5", arguments=(i, config, label_root))
-        for i in _labelled(category, split, label_root)
+        for i in _pictured(category, split, objects, label_root)
     ]
     return run_shards(
         tasks,
@@ -561,6 +599,7 @@ def generate_reartmix(
     folder: Path,
     scenes: int,
     *,
+    objects: int | None = None,
     config: GenerationConfig = GenerationConfig(),
     categories: Sequence[str] = SETS["reartmix"],
     label_root: Path | None = None,
@@ -568,13 +607,15 @@ def generate_reartmix(
     backend: str = "loky",
     progress: bool = True,
 ) -> Manifest:
-    """Makes shards of scenes with the labelled objects of a split; goes on where it stopped.
+    """Makes shards of scenes with the objects of a split; goes on where it stopped.
+
+    They are those of ``generate_artimage``, of each category.
 
     Raises:
         InvalidArgumentError: no labels there, or the folder was made with another configuration.
         RendererUnavailableError: no device here can render.
     """
-    ids = [i for category in categories for i in _labelled(category, split, label_root)]
+    ids = [i for category in categories for i in _pictured(category, split, objects, label_root)]
     tasks = [
         ShardTask(
             name=f"scenes_{first:06d}.h5",
@@ -600,15 +641,23 @@ def generate_reartmix(
     )
 
 
-def _labelled(category: str, split: catalog.Split, label_root: Path | None) -> Sequence[str]:
-    """Ids of the labelled objects of a split, at least one."""
-    ids = labelled_ids(category, split, label_root)
-    if not ids:
-        raise InvalidArgumentError(
-            f"no labels for {category}/{split}: run `artgym annotate --category {category} "
-            f"--split {split}` first"
-        )
-    return ids
+def _pictured(
+    category: str, split: catalog.Split, objects: int | None, label_root: Path | None
+) -> Sequence[str]:
+    """Ids of the objects of a split that are pictured, at least one."""
+    labelled = labelled_ids(category, split, label_root)
+    if objects is None:
+        if not labelled:
+            raise InvalidArgumentError(
+                f"no labels for {category}/{split}: run `artgym annotate --category {category} "
+                f"--split {split}` first, or say how many objects to picture without"
+            )
+        return labelled
+    if objects < 1:
+        raise InvalidArgumentError(f"objects={objects}: expected 1 or more.")
+    first = catalog.object_ids(category, split, objects)
+    others = [object_id for object_id in first if object_id not in set(labelled)]
+    return [*labelled, *others[: max(0, objects - len(labelled))]]
 
 
 def _pictures_task(arguments: tuple[str, GenerationConfig, Path | None]) -> list[Picture]:

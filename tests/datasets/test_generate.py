@@ -10,6 +10,7 @@ import pytest
 
 from artgym import cli
 from artgym.annotation.annotate import (
+    joint_states,
     label_file_name,
     labels_folder,
     positions_at,
@@ -34,13 +35,15 @@ from artgym.datasets.sample import (
     JOINT_PRISMATIC,
     JOINT_REVOLUTE,
 )
-from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.errors import InvalidArgumentError
 from artgym.files import write_arrays
 from artgym.geometry import transforms
 from artgym.geometry.camera import project
 from artgym.geometry.grasps import NUM_CANDIDATES
 from artgym.objects import catalog
 from artgym.objects.model import canonical_box
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
+from icaf4_policy.targets import DrawConfig, draw_item, targets_from_sample
 
 FRACTIONS = (0.05, 0.4)
 CONFIG = GenerationConfig(
@@ -226,6 +229,21 @@ def test_carried_successes_keep_clear_of_everything(samples, labels):
             assert verdict[0, 0] == Verdict.POSSIBLE
 
 
+def test_an_object_without_labels_is_pictured_without_grasps(labels):
+    pictures = make_pictures("drawer/1003", CONFIG, labels)
+    states = joint_states("drawer/1003")
+    assert len(pictures) == len(states)
+    for picture, fractions in zip(pictures, states, strict=True):
+        (sample,) = picture.samples
+        np.testing.assert_allclose(sample.open_fraction[1:], fractions, atol=1e-5)
+        assert len(sample.grasp_part) == 0
+        known = sample.affordance != AFFORDANCE_UNKNOWN
+        np.testing.assert_array_equal(known, sample.part == 0)
+        targets = targets_from_sample(sample, ["drawer"], anchors_from_config(AnchorConfig()), 500)
+        draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=16)
+        assert not draw_item(targets, draw, np.random.default_rng(0))["grasp_weight"].any()
+
+
 def test_scenes_show_several_objects_that_do_not_touch(labels):
     scenes = make_scenes(["drawer/1001", "drawer/1002", "laptop/1000"], 5, 3, CONFIG, labels)
     assert len(scenes) == 3
@@ -296,11 +314,21 @@ def test_command_line(labels, tmp_path, capsys):
     assert (tmp_path / "laptop" / "val" / "laptop_1000.h5").exists()
 
 
+def test_more_objects_than_are_labelled(labels, tmp_path):
+    manifest = generate_artimage(
+        "drawer", "val", tmp_path, objects=3, config=CONFIG, label_root=labels, progress=False
+    )
+    names = [shard.name for shard in manifest.shards]
+    assert names == ["drawer_1000.h5", "drawer_1001.h5", "drawer_1002.h5"]
+    # Two labelled states from two places; four states of the first drawer from one.
+    assert [shard.items for shard in manifest.shards] == [4, 4, 4]
+    with pytest.raises(InvalidArgumentError, match="objects=0"):
+        generate_artimage("drawer", "val", tmp_path, objects=0, label_root=labels)
+
+
 def test_without_labels(tmp_path):
     with pytest.raises(InvalidArgumentError, match="artgym annotate --category drawer"):
         generate_artimage("drawer", "val", tmp_path / "out", label_root=tmp_path)
-    with pytest.raises(DamagedFileError, match="drawer_1001"):
-        make_pictures("drawer/1001", CONFIG, tmp_path)
     assert not (tmp_path / "out").exists()
 
 
