@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,13 @@ import numpy as np
 import torch
 
 from artgym.datasets.authors import AuthorsFolder, AuthorsSample
-from artgym.datasets.picture_files import SampleFolder
-from artgym.datasets.sample import Sample
+from artgym.datasets.picture_files import PictureFolder, SampleFolder
+from artgym.datasets.sample import Picture, Sample
 from artgym.errors import InvalidArgumentError
 from icaf4_policy import drawing
 from icaf4_policy.checkpoint import description_path
+from icaf4_policy.detector.training import DetectorTrainingConfig
+from icaf4_policy.detector.training import train_detector as run_detector_training
 from icaf4_policy.inference import Perception
 from icaf4_policy.training import TrainingConfig
 from icaf4_policy.training import train as run_training
@@ -96,6 +98,34 @@ def _training_samples(data: Path, categories: Sequence[str]) -> tuple[Samples, S
     )
 
 
+def train_detector(
+    config: DetectorTrainingConfig, *, data: Path, out: Path, threads: int = 1
+) -> int:
+    """Train the detector on generated pictures. Interrupted, the same command goes on.
+
+    Args:
+        config: how to train.
+        data: folder that holds, at any depth, folders `train` and `val` made by `artgym generate`.
+        out: weights to write, ending in .safetensors.
+        threads: of torch; results are repeatable for the same number of them.
+    """
+    torch.set_num_threads(threads)
+    run_detector_training(config, _pictures(data, "train"), _pictures(data, "val"), out)
+    print(f"wrote {out} and {description_path(out)}")
+    return 0
+
+
+def _pictures(data: Path, split: str) -> Iterator[Picture]:
+    """The pictures of a split in all sets below a folder."""
+    manifests = sorted(data.glob(f"**/{split}/manifest.json"))
+    if not manifests:
+        raise InvalidArgumentError(
+            f"data={str(data)!r} has no pictures of the split {split!r}: make them with 'artgym "
+            f"generate reartmix --out {data}'."
+        )
+    return chain.from_iterable(PictureFolder(manifest.parent) for manifest in manifests)
+
+
 def predict(
     *,
     weights: Path,
@@ -165,4 +195,8 @@ def _json_fields(record: Any) -> dict[str, Any]:
     return {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in values.items()}
 
 
-COMMANDS: dict[str, Callable[..., int]] = {"train": train, "predict": predict}
+COMMANDS: dict[str, Callable[..., int]] = {
+    "train": train,
+    "train-detector": train_detector,
+    "predict": predict,
+}

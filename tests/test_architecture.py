@@ -41,11 +41,13 @@ ALLOWED_IMPORTS = {
     ),
     "benchmarks": ("benchmarks", "artgym", "icaf4_policy"),
 }
-# Who may import the simulator, by prefix of the module's name.
-SIMULATOR_USERS = {
+# Who may import what others may not, by prefix of the module's name.
+SOLE_USERS = {
     # The protocol is another project's, in a process of its own.
     "sapien": ("artgym.sim", "artgym.maniskill", "benchmarks.where2act_protocol"),
     "mani_skill": ("artgym.maniskill", "benchmarks.maniskill_twin"),
+    # Where its compiled operators are missing, they must be registered before it is imported.
+    "torchvision": ("icaf4_policy.detector.torchvision_ops",),
 }
 # The plain-numpy packages import nothing that is heavy or draws.
 NUMPY_ONLY = ("artgym.geometry",)
@@ -105,8 +107,8 @@ def complaints(source: str, module: str, *, is_package: bool = False) -> list[st
             is_in(name, allowed) for allowed in ALLOWED_IMPORTS[rule]
         ):
             found.append(f"{where}; {rule} may import {ALLOWED_IMPORTS[rule]}")
-        for simulator, users in SIMULATOR_USERS.items():
-            if is_in(name, simulator) and not any(is_in(module, user) for user in users):
+        for package, users in SOLE_USERS.items():
+            if is_in(name, package) and not any(is_in(module, user) for user in users):
                 found.append(f"{where}; only {users} may")
         if any(is_in(module, package) for package in NUMPY_ONLY) and any(
             is_in(name, ban) for ban in NUMPY_ONLY_BANS
@@ -152,6 +154,7 @@ def test_module_keeps_the_architecture(path: Path) -> None:
         ("icaf4_policy.policy", "from artgym.envs import articulated_env"),
         ("icaf4_policy.policy", "import artgym"),
         ("icaf4_policy.policy", "import sapien"),
+        ("icaf4_policy.detector.model", "from torchvision.ops import nms"),
         ("benchmarks.rate", "import sapien"),
         ("icaf4_policy.checkpoint", "import pickle"),
         ("icaf4_policy.checkpoint", "import torch\ntorch.load('x')"),

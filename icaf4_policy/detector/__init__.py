@@ -1,0 +1,1 @@
+"""Mask R-CNN: which objects are in an RGB-D picture, and which pixels are theirs."""
