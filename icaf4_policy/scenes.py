@@ -1,0 +1,106 @@
+"""From a picture of a table to everything about each object on it: detector, then network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
+
+from artgym.datasets.sample import level_from_camera
+from artgym.geometry.camera import points_from_depth
+from icaf4_policy.detector.inference import Detection, Detector
+from icaf4_policy.inference import Perception, Prediction
+from icaf4_policy.tabletop import HEIGHT_ABOVE_TABLE, MIN_OBJECT_POINTS, fit_table
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeenObject:
+    """One object of a scene.
+
+    Attributes:
+        detection: where it is and what.
+        prediction: everything about it.
+        part_mask: uint8 (H, W): predicted part + 1, 0 where the object is not.
+        affordance: float32 (H, W): probability that a pixel of it can be grasped, 0 elsewhere.
+    """
+
+    detection: Detection
+    prediction: Prediction
+    part_mask: NDArray[np.uint8]
+    affordance: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScenePerception:
+    """A detector, and networks for the categories that it finds.
+
+    Attributes:
+        detector: finds the objects.
+        perceptions: by category; what has none is passed over.
+    """
+
+    detector: Detector
+    perceptions: Mapping[str, Perception]
+
+    def look(
+        self,
+        rgb: ArrayLike,
+        depth: ArrayLike,
+        intrinsics: ArrayLike,
+        up_camera_hint: ArrayLike | None = None,
+        *,
+        min_score: float = 0.5,
+        rng: np.random.Generator,
+    ) -> list[SeenObject]:
+        """All objects on a table, the surest first.
+
+        Args:
+            rgb: uint8 (H, W, 3).
+            depth: (H, W), metres along z, 0 where unknown.
+            intrinsics: (3, 3).
+            up_camera_hint: rough upward direction in the camera frame, when known.
+            min_score: less certain detections are left out.
+            rng: for the fits and the choice of points.
+
+        Raises:
+            InvalidArgumentError: shapes do not agree, or there is no table.
+        """
+        rgb, depth = np.asarray(rgb), np.asarray(depth, dtype=float)
+        detections = self.detector.detect(rgb, depth, min_score=min_score)
+        points_camera = points_from_depth(depth, np.asarray(intrinsics, dtype=float))
+        is_seen = np.isfinite(depth) & (depth > 0)
+        up_camera, table_camera = fit_table(points_camera[is_seen], rng, up_camera_hint)
+        stands_out = (points_camera - table_camera) @ up_camera > HEIGHT_ABOVE_TABLE
+        objects = []
+        for detection in detections:
+            mask = detection.mask & is_seen & stands_out
+            if detection.category not in self.perceptions or mask.sum() < MIN_OBJECT_POINTS:
+                continue
+            prediction = self.perceptions[detection.category].predict(
+                points_camera[mask],
+                rgb[mask],
+                level_from_camera(up_camera),
+                table_camera=table_camera,
+                rng=rng,
+            )
+            objects.append(_spread(detection, prediction, points_camera, mask))
+        return objects
+
+
+def _spread(
+    detection: Detection, prediction: Prediction, points_camera: Array, mask: NDArray[np.bool_]
+) -> SeenObject:
+    """What the points that the network saw say of every pixel: the nearest speaks."""
+    _, near = cKDTree(prediction.points_camera).query(points_camera[mask])
+    part_mask = np.zeros(mask.shape, dtype=np.uint8)
+    affordance = np.zeros(mask.shape, dtype=np.float32)
+    part_mask[mask] = prediction.part[near] + 1
+    affordance[mask] = prediction.affordance[near]
+    return SeenObject(
+        detection=detection, prediction=prediction, part_mask=part_mask, affordance=affordance
+    )

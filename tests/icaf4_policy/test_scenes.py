@@ -1,0 +1,70 @@
+"""A scene whose objects are detected without error: what the networks say lands on their pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from icaf4_policy.backbone.pointnet2 import BackboneConfig
+from icaf4_policy.detector.evaluation import true_detections
+from icaf4_policy.inference import Perception
+from icaf4_policy.model import Icaf4, ModelConfig
+from icaf4_policy.scenes import ScenePerception
+from tests.icaf4_policy.toy import toy_picture
+
+
+class TruthfulDetector:
+    """Finds what is there."""
+
+    def __init__(self, picture) -> None:
+        self.found = true_detections(picture)
+
+    def detect(self, rgb, depth, *, min_score):
+        assert rgb.shape == (*depth.shape, 3)
+        return [each for each in self.found if each.score >= min_score]
+
+
+@pytest.fixture(scope="module")
+def picture():
+    return toy_picture(3, num_points=2500)
+
+
+def perception():
+    torch.manual_seed(0)
+    config = ModelConfig(
+        categories=("toy",),
+        num_parts=2,
+        length_units=(0.25,),
+        num_points=512,
+        backbone=BackboneConfig(centers=(64, 16), neighbors=8),
+    )
+    return Perception(model=Icaf4(config).eval(), category="toy")
+
+
+def look(picture, perceptions):
+    scene = ScenePerception(detector=TruthfulDetector(picture), perceptions=perceptions)
+    rng = np.random.default_rng(0)
+    return scene.look(picture.rgb, picture.depth, picture.intrinsics, rng=rng)
+
+
+def test_every_pixel_of_an_object_is_told_its_part(picture):
+    (seen,) = look(picture, {"toy": perception()})
+    mask = seen.detection.mask
+    assert seen.part_mask.shape == seen.affordance.shape == picture.depth.shape
+    assert not seen.part_mask[~mask].any()
+    assert not seen.affordance[~mask].any()
+    # All but what lies so low that it might be the table.
+    assert (seen.part_mask[mask] > 0).mean() > 0.9
+    assert seen.part_mask.max() <= 2
+    assert len(seen.prediction.part_boxes) == 2
+
+
+def test_the_same_scene_gives_the_same(picture):
+    first, second = (look(picture, {"toy": perception()})[0] for _ in range(2))
+    np.testing.assert_array_equal(first.part_mask, second.part_mask)
+    np.testing.assert_array_equal(first.affordance, second.affordance)
+
+
+def test_a_category_without_a_network_is_passed_over(picture):
+    assert look(picture, {}) == []
