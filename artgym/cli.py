@@ -319,8 +319,9 @@ def generate(
         backend: loky for processes of this machine, or a cluster's dask or ray.
     """
     from artgym.datasets import generate as pictures
+    from artgym.datasets.sets import SETS
 
-    chosen = category or pictures.SETS[set]
+    chosen = category or SETS[set]
     for name in chosen:
         for each in split:
             # A wrong name shall be called that, and not a lack of labels.

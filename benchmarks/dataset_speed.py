@@ -16,8 +16,9 @@ from typing import Any
 from rich.table import Table
 from torch.utils.data import DataLoader
 
-from artgym.datasets.generate import SETS, generate_artimage
+from artgym.datasets.generate import generate_artimage
 from artgym.datasets.picture_files import SampleFolder
+from artgym.datasets.sets import SETS
 from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from benchmarks import record

@@ -20,8 +20,9 @@ from rich.table import Table
 
 from artgym.annotation.annotate import labelled_ids, positions_at, read_labels
 from artgym.annotation.trial import try_grasp
-from artgym.datasets.generate import SETS, GenerationConfig, SetName, make_pictures, make_scenes
+from artgym.datasets.generate import GenerationConfig, make_pictures, make_scenes
 from artgym.datasets.sample import AFFORDANCE_YES, Picture, Sample
+from artgym.datasets.sets import SETS, SetName
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.camera import pixel_rays, project

@@ -24,7 +24,7 @@ from rich.table import Table
 from artgym.annotation.annotate import positions_at, tried_poses, visible_points
 from artgym.annotation.filter import Verdict, judge
 from artgym.annotation.trial import REFERENCE, TRIAL_ENDS, TrialConfig, try_grasp
-from artgym.datasets.generate import SETS
+from artgym.datasets.sets import SETS
 from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.grasps import NUM_CANDIDATES

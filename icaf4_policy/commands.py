@@ -18,8 +18,7 @@ from artgym.datasets.sample import Picture, Sample
 from artgym.errors import InvalidArgumentError
 from icaf4_policy import drawing
 from icaf4_policy.checkpoint import description_path
-from icaf4_policy.detector.training import DetectorTrainingConfig
-from icaf4_policy.detector.training import train_detector as run_detector_training
+from icaf4_policy.detector.config import DetectorTrainingConfig
 from icaf4_policy.inference import Perception
 from icaf4_policy.training import TrainingConfig
 from icaf4_policy.training import train as run_training
@@ -109,6 +108,9 @@ def train_detector(
         out: weights to write, ending in .safetensors.
         threads: of torch; results are repeatable for the same number of them.
     """
+    # torchvision takes long to import, and only this command needs it.
+    from icaf4_policy.detector.training import train_detector as run_detector_training
+
     torch.set_num_threads(threads)
     run_detector_training(config, _pictures(data, "train"), _pictures(data, "val"), out)
     print(f"wrote {out} and {description_path(out)}")

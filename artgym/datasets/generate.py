@@ -13,8 +13,6 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +39,7 @@ from artgym.datasets.sample import (
     Sample,
     level_from_camera,
 )
+from artgym.datasets.sets import SETS
 from artgym.errors import InvalidArgumentError
 from artgym.files import Manifest
 from artgym.geometry import transforms
@@ -57,16 +56,6 @@ from artgym.sim.setting import add_clutter, add_lights, random_placement, random
 from artgym.sim.tabletop import fits_among_others, footprint, random_place
 
 Array = NDArray[np.floating]
-
-SetName = Literal["artimage", "reartmix"]
-
-#: The categories of the paper's two sets.
-SETS: Mapping[SetName, tuple[str, ...]] = MappingProxyType(
-    {
-        "artimage": ("laptop", "eyeglasses", "dishwasher", "drawer", "scissors"),
-        "reartmix": ("box", "cutter", "drawer", "scissors", "stapler"),
-    }
-)
 
 #: Fewest and most objects of a scene, and how far from the table's middle they stand, metres.
 _SCENE_OBJECTS, _SCENE_HALF_SIDE = (3, 5), 0.33

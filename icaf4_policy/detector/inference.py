@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.checkpoint import load_network
-from icaf4_policy.detector.model import DetectorConfig, DetectorNetwork
+from icaf4_policy.detector.config import DetectorConfig
+from icaf4_policy.detector.model import DetectorNetwork
 from icaf4_policy.detector.pictures import fitting_scale, network_input, shrunk
 from icaf4_policy.detector.torchvision_ops import paste_masks_in_image
 

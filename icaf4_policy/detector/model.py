@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections import OrderedDict
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from artgym.errors import InvalidArgumentError
+from icaf4_policy.detector.config import STRIDES, DetectorConfig
 from icaf4_policy.detector.torchvision_ops import (
     AnchorGenerator,
     FeaturePyramidNetwork,
@@ -24,8 +23,6 @@ from icaf4_policy.detector.torchvision_ops import (
 
 #: Of the red, green and blue channels in [0, 1], and of depth in metres.
 _MEAN, _SPREAD = (0.5, 0.5, 0.5, 1.0), (0.25, 0.25, 0.25, 0.5)
-#: Strides of the pyramid's levels; pictures are padded to whole cells of the coarsest.
-_STRIDES = (4, 8, 16, 32)
 #: Sides of the anchors of each level, pixels of the network's input, and their height : width.
 _ANCHOR_SIDES = ((24,), (44,), (80,), (144,))
 _ANCHOR_RATIOS = (0.5, 1.0, 2.0)
@@ -33,58 +30,6 @@ _ANCHOR_RATIOS = (0.5, 1.0, 2.0)
 #: those of twice the side from the third, pixels of the network's input.
 _CANONICAL_SIDE = 112
 _POOLED_BOX, _POOLED_MASK = 7, 14
-
-
-@dataclass(frozen=True, kw_only=True)
-class DetectorConfig:
-    """What a detector finds and how large it is.
-
-    Attributes:
-        categories: what it tells apart, in the order of its outputs.
-        input_size: (width, height) that pictures are shrunk to fit, pixels.
-        use_depth: whether depth is a fourth channel beside the colours.
-        widths: channels of the backbone at strides 4, 8, 16 and 32.
-        blocks: residual blocks at each of them.
-        pyramid_channels: channels of the feature pyramid and of the mask head.
-        box_channels: hidden units of the box head.
-        proposals: regions looked at in a picture, after suppression.
-        detections: the most objects reported in a picture.
-    """
-
-    categories: tuple[str, ...]
-    input_size: tuple[int, int] = (320, 240)
-    use_depth: bool = True
-    widths: tuple[int, ...] = (32, 64, 96, 160)
-    blocks: tuple[int, ...] = (1, 2, 2, 2)
-    pyramid_channels: int = 64
-    box_channels: int = 192
-    proposals: int = 60
-    detections: int = 20
-
-    def __post_init__(self) -> None:
-        if not self.categories or len(set(self.categories)) < len(self.categories):
-            raise InvalidArgumentError(
-                f"categories={self.categories} must be at least one name, each only once."
-            )
-        if len(self.input_size) != 2 or min(self.input_size) < 2 * _STRIDES[-1]:
-            raise InvalidArgumentError(
-                f"input_size={self.input_size} must be (width, height), each at least "
-                f"{2 * _STRIDES[-1]} pixels."
-            )
-        for name in ("widths", "blocks"):
-            if len(getattr(self, name)) != len(_STRIDES):
-                raise InvalidArgumentError(
-                    f"{name}={getattr(self, name)} must have {len(_STRIDES)} entries, one for each "
-                    f"of the strides {_STRIDES}."
-                )
-        sizes = (self.pyramid_channels, self.box_channels, self.proposals, self.detections)
-        if min(*self.widths, *self.blocks, *sizes) < 1:
-            raise InvalidArgumentError(f"the sizes of {self} must be at least 1.")
-
-    @property
-    def channels(self) -> int:
-        """Channels of the network's input."""
-        return 4 if self.use_depth else 3
 
 
 def _convolution(channels_in: int, channels_out: int, stride: int = 1, side: int = 3) -> nn.Module:
@@ -151,11 +96,11 @@ class DetectorNetwork(MaskRCNN):
 
     def __init__(self, config: DetectorConfig) -> None:
         classes, channels = len(config.categories) + 1, config.pyramid_channels
-        levels = [str(i) for i in range(len(_STRIDES))]
+        levels = [str(i) for i in range(len(STRIDES))]
         super().__init__(
             _Pyramid(config),
             num_classes=None,
-            rpn_anchor_generator=AnchorGenerator(_ANCHOR_SIDES, (_ANCHOR_RATIOS,) * len(_STRIDES)),
+            rpn_anchor_generator=AnchorGenerator(_ANCHOR_SIDES, (_ANCHOR_RATIOS,) * len(STRIDES)),
             rpn_pre_nms_top_n_train=300,
             rpn_pre_nms_top_n_test=150,
             rpn_post_nms_top_n_train=200,
@@ -194,7 +139,7 @@ class DetectorNetwork(MaskRCNN):
             the boxes.
         """
         height, width = images.shape[-2:]
-        right, below = -width % _STRIDES[-1], -height % _STRIDES[-1]
+        right, below = -width % STRIDES[-1], -height % STRIDES[-1]
         padded = functional.pad((images - self.mean) / self.spread, (0, right, 0, below))
         sizes = [(height, width)] * len(images)
         features = self.backbone(padded)
@@ -219,7 +164,7 @@ class _BoxPredictor(nn.Module):
 
 
 def _pooler(levels: list[str], side: int) -> MultiScaleRoIAlign:
-    second = _STRIDES[1].bit_length() - 1
+    second = STRIDES[1].bit_length() - 1
     return MultiScaleRoIAlign(
         levels, side, 2, canonical_scale=_CANONICAL_SIDE, canonical_level=second
     )

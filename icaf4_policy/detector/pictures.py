@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from artgym.datasets.sample import Picture
 from artgym.errors import InvalidArgumentError
-from icaf4_policy.detector.model import DetectorConfig
+from icaf4_policy.detector.config import AugmentationConfig, DetectorConfig
 
 Array = NDArray[np.floating]
 
@@ -40,29 +40,6 @@ class ShrunkPicture:
     instance_mask: NDArray[np.uint8]
     boxes: NDArray[np.float32]
     labels: NDArray[np.int64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class AugmentationConfig:
-    """How pictures are changed at random.
-
-    Attributes:
-        flip: share of pictures that are mirrored left to right.
-        zoom: spread of the logarithm of the magnification; depth shrinks with it, as if the
-            camera came nearer.
-        shift: largest shift, as a share of the picture's sides.
-        color_jitter: spread of the changes of brightness, contrast and tint.
-    """
-
-    flip: float = 0.5
-    zoom: float = 0.2
-    shift: float = 0.1
-    color_jitter: float = 0.2
-
-    def __post_init__(self) -> None:
-        for name in ("flip", "zoom", "shift", "color_jitter"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)} must be in [0, 1].")
 
 
 def shrunk(image: NDArray, size: tuple[int, int], interpolation: int) -> NDArray:

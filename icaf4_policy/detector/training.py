@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import torch
@@ -15,11 +13,11 @@ from tqdm import tqdm
 
 from artgym.datasets.sample import Picture
 from artgym.errors import InvalidArgumentError
+from icaf4_policy.detector.config import DetectorTrainingConfig
 from icaf4_policy.detector.evaluation import evaluate
 from icaf4_policy.detector.inference import Detector
-from icaf4_policy.detector.model import DetectorConfig, DetectorNetwork
+from icaf4_policy.detector.model import DetectorNetwork
 from icaf4_policy.detector.pictures import (
-    AugmentationConfig,
     ShrunkPicture,
     changed,
     network_input,
@@ -27,52 +25,6 @@ from icaf4_policy.detector.pictures import (
     prepare,
 )
 from icaf4_policy.training_run import TrainingRun, cosine_rate, keep_freed_memory
-
-#: The categories of ``artgym generate reartmix``.
-REARTMIX = ("box", "cutter", "drawer", "scissors", "stapler")
-
-
-@dataclass(frozen=True, kw_only=True)
-class DetectorTrainingConfig:
-    """How to train a detector.
-
-    Attributes:
-        model: what it finds and how large it is.
-        epochs: passes over the training pictures.
-        batch_size: pictures a step.
-        learning_rate: of AdamW, at its highest; it rises, and falls along half a cosine.
-        weight_decay: of AdamW.
-        warmup_share: share of the steps that rise, in [0, 1).
-        gradient_limit: the norm that gradients are clipped to.
-        precision: of the backbone's products while training.
-        validate_every: epochs between validations; the last epoch is always validated.
-        seed: of the weights, the order of pictures and their changes.
-        augmentation: how pictures are changed at random.
-    """
-
-    model: DetectorConfig = field(default_factory=lambda: DetectorConfig(categories=REARTMIX))
-    epochs: int = 40
-    batch_size: int = 4
-    learning_rate: float = 1e-3
-    weight_decay: float = 1e-2
-    warmup_share: float = 0.03
-    gradient_limit: float = 5.0
-    precision: Literal["float32", "bfloat16"] = "bfloat16"
-    validate_every: int = 2
-    seed: int = 0
-    augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
-
-    def __post_init__(self) -> None:
-        for name in ("epochs", "batch_size", "validate_every"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)} must be at least 1.")
-        for name in ("learning_rate", "gradient_limit"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise InvalidArgumentError(
-                    f"{name}={getattr(self, name)} must be positive and finite."
-                )
-        if not 0 <= self.warmup_share < 1:
-            raise InvalidArgumentError(f"warmup_share={self.warmup_share} must be in [0, 1).")
 
 
 def train_detector(

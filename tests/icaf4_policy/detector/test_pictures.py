@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from artgym.errors import InvalidArgumentError
-from icaf4_policy.detector.model import DetectorConfig
+from icaf4_policy.detector.config import DetectorConfig
 from icaf4_policy.detector.pictures import (
     AugmentationConfig,
     changed,
