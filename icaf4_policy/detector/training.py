@@ -80,7 +80,12 @@ def train_detector(
         stop_after_epoch=stop_after_epoch,
         validate_every=config.validate_every,
         train_epoch=lambda: _train_epoch(run, model, training, config),
-        validate=lambda: evaluate(detector, validation),
+        validate=lambda: {
+            # The means over categories are enough to follow a training by.
+            name: value
+            for name, value in evaluate(detector, validation).items()
+            if name.count("/") == 1
+        },
         facts={
             "config": asdict(config),
             "training_pictures": len(training),

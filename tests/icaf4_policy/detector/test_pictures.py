@@ -69,6 +69,11 @@ def test_input_has_depth_in_metres():
     np.testing.assert_array_equal(image[3], picture.depth)
 
 
+def test_a_change_never_loses_all_objects():
+    wild, rng = AugmentationConfig(zoom=1.0, shift=1.0), np.random.default_rng(0)
+    assert all(len(changed(shrink(scene(i), CONFIG), wild, rng).labels) for i in range(30))
+
+
 def test_an_unknown_category_is_named():
     with pytest.raises(InvalidArgumentError, match="pan"):
         shrink(scene(), DetectorConfig(categories=("mug",)))
