@@ -79,8 +79,8 @@ def test_one_picture_is_learnt_by_heart(tmp_path):
     assert row["box/map50"] == pytest.approx(1.0)
     assert row["mask/map50"] == pytest.approx(1.0)
     found = detector.detect(picture.rgb, picture.depth)
-    # So short a training may leave unsure ones behind the two.
-    assert sorted(each.category for each in found[:2]) == ["mug", "pan"]
+    # So short a training leaves smaller finds inside the true ones.
+    assert {each.category for each in found} == {"mug", "pan"}
 
 
 def test_command_trains_on_all_sets_of_a_folder(tmp_path, pictures, capsys):
