@@ -42,7 +42,7 @@ class FilterConfig:
     """
 
     spacing: float = 0.007
-    penetration: float = 0.004
+    penetration: float = 0.005
     reach: float = 0.004
 
 

@@ -30,7 +30,7 @@ _T_GRASP_HAND = transforms.invert(T_hand_grasp)
 
 
 #: The cheapest settings that keep the outcomes of ``REFERENCE`` (``benchmarks.speed labels``).
-_FAST = PhysicsConfig(timestep=1.0 / 240.0, contact_offset=0.002)
+_FAST = PhysicsConfig(timestep=1.0 / 480.0, contact_offset=0.003)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +39,7 @@ class TrialConfig:
 
     Attributes:
         physics: time step, iterations, gains.
+        approach_timestep: seconds of a step while the hand comes, where it should touch nothing.
         standoff: where the hand starts, metres before the grasp along the approach.
         speed: of the hand, m/s, in the approach and along the joint.
         close_time: seconds given to the jaws.
@@ -47,12 +48,13 @@ class TrialConfig:
             spring.
         miss: how far from the grasp pose the open hand may come to rest, metres.
         nudge: how far the approach may move a part, as a share of its range.
-        stride: simulator steps between two looks at the contacts.
+        look_time: seconds between two looks at the contacts.
         early_stop: whether an attempt ends as soon as it cannot succeed any more.
         slip_time: seconds without touching the part after which an early stop calls it lost.
     """
 
     physics: PhysicsConfig = _FAST
+    approach_timestep: float = 1.0 / 240.0
     standoff: float = 0.06
     speed: float = 0.4
     close_time: float = 0.2
@@ -60,15 +62,18 @@ class TrialConfig:
     overshoot: float = 0.1
     miss: float = 0.003
     nudge: float = 0.01
-    stride: int = 4
+    look_time: float = 1.0 / 60.0
     early_stop: bool = True
     slip_time: float = 0.1
 
 
-#: The judge of the fast settings: half the time step, three times the iterations, contacts known
-#: from far, twice the looks, no early stop.
+#: The judge of the fast settings: fine steps all the way, three times the iterations, contacts
+#: known from far, twice the looks, no early stop.
 REFERENCE = TrialConfig(
-    physics=PhysicsConfig(timestep=1.0 / 480.0, position_iterations=50), early_stop=False
+    physics=PhysicsConfig(timestep=1.0 / 480.0, position_iterations=50),
+    approach_timestep=1.0 / 480.0,
+    look_time=1.0 / 120.0,
+    early_stop=False,
 )
 
 #: How an attempt ends: the part "moved" through half its range, gripped or not; the hand was at the
@@ -163,15 +168,19 @@ class _Attempt:
         self._start = self._fractions(q)
         self.progress = Progress.begin(float(self._start[part - 1]))
         self.steps = 0
+        #: Simulator steps between two looks.
+        self._stride = 1
         #: Looks since the part was last touched.
         self._untouched = 0
 
     def run(self, approach: Array, carry: Array) -> str:
         """The hand's poses (n, 4, 4) before and after the jaws close; one of ``TRIAL_ENDS``."""
-        early = self._config.early_stop
+        config = self._config
+        self._set_timestep(config.approach_timestep)
         blocked = self._approach_is_blocked(approach)
-        if blocked and early:
+        if blocked and config.early_stop:
             return "blocked"
+        self._set_timestep(config.physics.timestep)
         self._hand.close_jaws()
         end = self._close_and_carry(carry)
         return "blocked" if blocked else end
@@ -185,12 +194,12 @@ class _Attempt:
             if blocked and config.early_stop:
                 return True
             self._hand.pull_to(target)
-            self._advance(config.stride)
+            self._advance(self._stride)
             blocked |= self._has_pushed()
         for _ in range(self._looks(config.settle_time)):
             if blocked and config.early_stop:
                 return True
-            self._advance(config.stride)
+            self._advance(self._stride)
             blocked |= self._has_pushed()
         return blocked or self._misses(approach[-1])
 
@@ -199,7 +208,7 @@ class _Attempt:
         config = self._config
         early, patience = config.early_stop, self._looks(config.slip_time)
         for _ in range(self._looks(config.close_time)):
-            self._advance(config.stride, look=True)
+            self._advance(self._stride, look=True)
             if early and self.progress.gripped_is_lost:
                 return "lost"
         if early and self._untouched >= patience:
@@ -208,15 +217,19 @@ class _Attempt:
         for target in (*poses_from_transforms(carry), *resting):
             if target is not None:
                 self._hand.pull_to(target)
-            self._advance(config.stride, look=True)
+            self._advance(self._stride, look=True)
             if self.progress.travel >= TRAVEL_THRESHOLD:
                 return "moved"
             if early and (self._untouched >= patience or self.progress.gripped_is_lost):
                 return "lost"
         return "not moved"
 
+    def _set_timestep(self, seconds: float) -> None:
+        self._scene.set_timestep(seconds)
+        self._stride = round(self._config.look_time / seconds)
+
     def _looks(self, seconds: float) -> int:
-        return max(1, round(seconds / _tick(self._config)))
+        return max(1, round(seconds / self._config.look_time))
 
     def _fractions(self, q: Array) -> Array:
         return (q - self._closed) / self._range
@@ -241,14 +254,9 @@ class _Attempt:
         return max(pushed, self.progress.path) > self._config.nudge
 
 
-def _tick(config: TrialConfig) -> float:
-    """Seconds between two looks."""
-    return config.physics.timestep * config.stride
-
-
 def _approach_path(T_object_hand: Array, config: TrialConfig) -> Array:
     """Hand poses (n, 4, 4), one a look, from the standoff to the pose itself."""
-    count = int(np.ceil(config.standoff / (config.speed * _tick(config))))
+    count = int(np.ceil(config.standoff / (config.speed * config.look_time)))
     back = np.linspace(config.standoff, 0.0, count + 1)[:, None] * [0.0, 0.0, -1.0]
     return T_object_hand @ transforms.translation(back)
 
@@ -267,5 +275,5 @@ def _carry_path(
 
     coarse = hand_at(np.linspace(start, goal, 9))
     length = np.linalg.norm(np.diff(coarse[:, :3, 3], axis=0), axis=1).sum()
-    count = max(2, int(np.ceil(length / (config.speed * _tick(config)))))
+    count = max(2, int(np.ceil(length / (config.speed * config.look_time))))
     return hand_at(np.linspace(start, goal, count + 1)[1:])

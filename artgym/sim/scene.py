@@ -326,6 +326,10 @@ class ManipulationScene:
         entity.pose = _TABLE_POSE
         self.sapien_scene.add_entity(entity)
 
+    def set_timestep(self, seconds: float) -> None:
+        """Changes how long a step is, from the next one on."""
+        self._system.timestep = seconds
+
     def step(self, count: int = 1) -> None:
         """Advances physics by ``count`` steps."""
         for _ in range(count):
