@@ -26,9 +26,9 @@ SEED, STEPS = 3, 30
 def weights(tmp_path):
     torch.manual_seed(0)
     config = ModelConfig(
-        category="drawer",
+        categories=("drawer",),
         num_parts=2,
-        length_unit=0.25,
+        length_units=(0.25,),
         num_points=512,
         backbone=BackboneConfig(centers=(64, 16), neighbors=8),
     )
