@@ -3,22 +3,19 @@ import json
 
 import numpy as np
 import pytest
-import torch
 from PIL import Image
 
 from artgym.datasets.sample import JOINT_NONE
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle, matrix_from_axis_angle
 from icaf4_policy import cli
-from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import save_model
 from icaf4_policy.drawing import read_rgb
 from icaf4_policy.evaluation import evaluate_sample
 from icaf4_policy.inference import Perception, ProposalConfig, _joint_from_votes, diverse
 from icaf4_policy.joint_consistency import consistent_fits
-from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.tabletop import fit_table, segment_object
-from tests.icaf4_policy.toy import toy_picture
+from tests.icaf4_policy.toy import toy_network, toy_picture
 
 
 @pytest.fixture(scope="module")
@@ -33,16 +30,8 @@ def sample(picture):
 
 @pytest.fixture(scope="module")
 def perception():
-    torch.manual_seed(0)
-    config = ModelConfig(
-        categories=("toy",),
-        num_parts=2,
-        length_units=(0.25,),
-        num_points=512,
-        backbone=BackboneConfig(centers=(64, 16), neighbors=8),
-    )
     proposals = ProposalConfig(points=64, count=16)
-    return Perception(model=Icaf4(config).eval(), category="toy", proposals=proposals)
+    return Perception(model=toy_network(), category="toy", proposals=proposals)
 
 
 def rng():

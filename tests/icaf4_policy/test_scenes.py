@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 
-from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.detector.evaluation import true_detections
 from icaf4_policy.inference import Perception
-from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.scenes import ScenePerception
-from tests.icaf4_policy.toy import toy_picture
+from tests.icaf4_policy.toy import toy_network, toy_picture
 
 
 class TruthfulDetector:
@@ -31,15 +28,7 @@ def picture():
 
 
 def perception():
-    torch.manual_seed(0)
-    config = ModelConfig(
-        categories=("toy",),
-        num_parts=2,
-        length_units=(0.25,),
-        num_points=512,
-        backbone=BackboneConfig(centers=(64, 16), neighbors=8),
-    )
-    return Perception(model=Icaf4(config).eval(), category="toy")
+    return Perception(model=toy_network(), category="toy")
 
 
 def look(picture, perceptions):

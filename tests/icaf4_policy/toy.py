@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 
 from artgym.datasets.sample import (
     JOINT_NONE,
@@ -16,6 +17,8 @@ from artgym.geometry.grasps import candidates_of_part
 from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.geometry.screw import joint_motion
 from artgym.geometry.transforms import apply, invert, transform_from, translation
+from icaf4_policy.backbone.pointnet2 import BackboneConfig
+from icaf4_policy.model import Icaf4, ModelConfig
 
 WIDTH, HEIGHT = 160, 120
 SIZES = np.array([[0.30, 0.20, 0.04], [0.30, 0.20, 0.02]])  # base, lid; metres
@@ -29,6 +32,19 @@ def _box_surface(size: np.ndarray, count: int, rng: np.random.Generator):
     points = rng.uniform(-0.5, 0.5, (count, 3))
     points[np.arange(count), axis] = 0.5 * sign
     return points * size, normals
+
+
+def toy_network() -> Icaf4:
+    """A small network of the object, not trained, the same each time."""
+    torch.manual_seed(0)
+    config = ModelConfig(
+        categories=("toy",),
+        num_parts=2,
+        length_units=(0.25,),
+        num_points=512,
+        backbone=BackboneConfig(centers=(64, 16), neighbors=8),
+    )
+    return Icaf4(config).eval()
 
 
 def toy_sample(seed: int = 0, num_points: int = 700) -> Sample:
