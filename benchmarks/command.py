@@ -40,7 +40,8 @@ def run(
     Args:
         name: of the benchmark's module.
         config_type: dataclass whose fields are the options.
-        report: measures, writes ``NAME.json`` to ``out``, and gives the tables.
+        report: measures, writes ``NAME.json`` to ``out``, and gives the tables; where the options
+            have a ``result_name``, it stands for NAME.
         arguments: what follows on the command line; by default the process's own.
 
     Returns:
@@ -59,5 +60,5 @@ def run(
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
     for table in tables:
         console.print(table)
-    print(f"wrote {config.out / f'{name}.json'}")
+    print(f"wrote {config.out / getattr(config, 'result_name', name)}.json")
     return 0

@@ -100,6 +100,11 @@ class FaultsConfig:
     seed: int = 0
     out: Path = record.RESULTS_FOLDER
 
+    @property
+    def result_name(self) -> str:
+        """What the result is called."""
+        return "faults" if self.work == "numbers" else f"faults_{self.work}"
+
     def __post_init__(self) -> None:
         if not sys.platform.startswith("linux"):
             raise InvalidArgumentError("this benchmark reads /proc: it runs on Linux alone.")
@@ -565,8 +570,7 @@ def table_from_rows(rows: dict[str, dict[str, Any]]) -> Table:
 def report(config: FaultsConfig) -> list[Table]:
     """Measures, writes the result and gives the table."""
     result = measure(config)
-    name = "faults" if config.work == "numbers" else f"faults_{config.work}"
-    record.write_result(config.out / f"{name}.json", result)
+    record.write_result(config.out / f"{config.result_name}.json", result)
     return [table_from_rows(result["rows"])]
 
 
