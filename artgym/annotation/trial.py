@@ -5,8 +5,8 @@ attempt succeeds if the part moves through half its range held between the finge
 (``tasks.success``: ``success_gripped``), provided that the open hand took the grasp's pose without
 being pushed away and without pushing any part.
 
-An attempt stops as soon as its outcome is known; ``REFERENCE`` does not, and steps finer: the slow
-judge of what is done here fast.
+An attempt stops as soon as its outcome is known; ``REFERENCE`` does not, solves contacts more
+exactly and looks more often: the slow judge of what is done here fast.
 """
 
 from __future__ import annotations
@@ -91,13 +91,11 @@ class Trial:
         success: the part moved through half its range, gripped.
         progress: the joint's motion.
         end: one of ``TRIAL_ENDS``.
-        steps: simulator steps spent.
     """
 
     success: bool
     progress: Progress
     end: str
-    steps: int
 
 
 def try_grasp(
@@ -144,7 +142,6 @@ def try_grasp(
         success=end == "moved" and bool(attempt.progress.success_gripped),
         progress=attempt.progress,
         end=end,
-        steps=attempt.steps,
     )
 
 
@@ -167,7 +164,6 @@ class _Attempt:
         self._range = np.array([joint.range for joint in joints])
         self._start = self._fractions(q)
         self.progress = Progress.begin(float(self._start[part - 1]))
-        self.steps = 0
         #: Simulator steps between two looks.
         self._stride = 1
         #: Looks since the part was last touched.
@@ -237,7 +233,6 @@ class _Attempt:
     def _advance(self, steps: int, *, look: bool = False) -> None:
         """Steps, and adds the part's motion; an open hand's contacts are not looked at."""
         self._scene.step(steps)
-        self.steps += steps
         contact = self._scene.contact(self._part) if look else PartContact(False, False)
         self._now = self._fractions(self._scene.body.positions())
         self.progress = self.progress.advance(
