@@ -31,7 +31,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             prog="icaf4",
             description=__doc__,
             args=sys.argv[1:] if arguments is None else list(arguments),
-            config=(tyro.conf.OmitArgPrefixes,),
         )
     except ArtgymError as error:
         print(f"icaf4: {error}", file=sys.stderr)

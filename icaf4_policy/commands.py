@@ -7,10 +7,11 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import torch
+import tyro
 
 from artgym.datasets.authors import AuthorsFolder, AuthorsSample
 from artgym.datasets.picture_files import PictureFolder, SampleFolder
@@ -29,9 +30,12 @@ Samples = Iterable[Sample | AuthorsSample]
 #: of the test.
 _AUTHORS_VALIDATION = 8
 
+#: A config's own options are called `--epochs`, those of what it holds `--anchors.kind`.
+_UNPREFIXED = tyro.conf.arg(name="")
+
 
 def train(
-    config: TrainingConfig,
+    config: Annotated[TrainingConfig, _UNPREFIXED],
     *,
     data: Path,
     out: Path,
@@ -78,11 +82,7 @@ def _training_samples(data: Path, categories: Sequence[str]) -> tuple[Samples, S
     """Those to train with, and those of other objects that choose the weights."""
     listed = [c for c in categories if (data / c / "train.txt").is_file()]
     if not listed:
-        training, validation = (
-            chain.from_iterable(SampleFolder(data / category / split) for category in categories)
-            for split in ("train", "val")
-        )
-        return training, validation
+        return _split(data, categories, "train"), _split(data, categories, "val")
     if len(categories) > 1:
         raise InvalidArgumentError(
             f"category={', '.join(categories)}: {data / listed[0]} holds the authors' data, which "
@@ -97,8 +97,16 @@ def _training_samples(data: Path, categories: Sequence[str]) -> tuple[Samples, S
     )
 
 
+def _split(data: Path, categories: Sequence[str], split: str) -> Iterator[Sample]:
+    return chain.from_iterable(SampleFolder(data / category / split) for category in categories)
+
+
 def train_detector(
-    config: DetectorTrainingConfig, *, data: Path, out: Path, threads: int = 1
+    config: Annotated[DetectorTrainingConfig, _UNPREFIXED],
+    *,
+    data: Path,
+    out: Path,
+    threads: int = 1,
 ) -> int:
     """Train the detector on generated pictures. Interrupted, the same command goes on.
 

@@ -151,11 +151,14 @@ def test_train_command(tmp_path, samples, capsys):
     weights = tmp_path / "weights" / "toy.safetensors"
     arguments = ["train", "--category", "toy", "--data", str(tmp_path / "data")]
     arguments += ["--out", str(weights), "--epochs", "1", "--num-points", "512"]
-    arguments += ["--num-grasp-points", "32", "--batch-size", "2"]
+    arguments += ["--num-grasp-points", "32", "--batch-size", "2", "--anchors.kind", "so3"]
     assert cli.main(arguments) == 0
     assert str(weights) in capsys.readouterr().out
     _, description = load_model(weights)
-    assert description["training"]["config"]["num_points"] == 512
+    facts = description["training"]
+    assert facts["config"]["num_points"] == 512
+    assert facts["config"]["anchors"]["kind"] == "so3"
+    assert (facts["training_samples"], facts["validation_samples"]) == tuple(map(len, samples))
 
 
 @pytest.fixture

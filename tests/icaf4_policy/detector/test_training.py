@@ -92,8 +92,17 @@ def test_command_trains_on_all_sets_of_a_folder(tmp_path, pictures, capsys):
             Manifest(config={}, planned=1, shards=(shard,)).write(folder)
     weights = tmp_path / "detector.safetensors"
     arguments = ["train-detector", "--data", str(tmp_path / "data"), "--out", str(weights)]
-    arguments += ["--categories", "mug", "pan", "--input-size", "128", "96", "--epochs", "1"]
-    arguments += ["--widths", "8", "8", "8", "8", "--blocks", "1", "1", "1", "1"]
+    arguments += [
+        "--model.categories",
+        "mug",
+        "pan",
+        "--model.input-size",
+        "128",
+        "96",
+        "--epochs",
+        "1",
+    ]
+    arguments += ["--model.widths", "8", "8", "8", "8", "--model.blocks", "1", "1", "1", "1"]
     assert cli.main(arguments) == 0
     assert str(weights) in capsys.readouterr().out
     description = json.loads(description_path(weights).read_text())
