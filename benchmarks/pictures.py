@@ -81,12 +81,12 @@ def take_pictures(task: PicturesTask) -> None:
 
 
 def _drawn(observation: Any, prediction: Prediction) -> NDArray[np.uint8]:
-    """The image and the three panels of ``draw_prediction``, enlarged and cut to the object."""
-    from icaf4_policy.drawing import draw_prediction
+    """The image and the three panels of ``draw_predictions``, enlarged and cut to the object."""
+    from icaf4_policy.drawing import draw_predictions
 
     rgb = observation["rgb"].repeat(_ZOOM, axis=0).repeat(_ZOOM, axis=1)
     intrinsics = observation["intrinsics"].reshape(3, 3) * [[_ZOOM], [_ZOOM], [1.0]]
-    drawn = draw_prediction(rgb, intrinsics, prediction, _DRAWN_GRASPS)
+    drawn = draw_predictions(rgb, intrinsics, [prediction], _DRAWN_GRASPS)
     middle = project(prediction.points_camera.mean(axis=0)[None], intrinsics)[0]
     size = np.minimum(_PANEL_SIZE, rgb.shape[1::-1])
     left, top = np.clip(middle - size / 2, 0, rgb.shape[1::-1] - size).astype(int)

@@ -6,7 +6,6 @@ import functools
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any, Protocol, cast, get_args
 
@@ -18,6 +17,7 @@ from artgym.envs.articulated_env import ArticulatedEnv
 from artgym.envs.observations import ObsMode
 from artgym.errors import InvalidArgumentError, MissingDependencyError, UnknownNameError
 from artgym.experts.scripted import ScriptedExpert
+from icaf4_policy.shipped import weights_path
 
 
 class Policy(Protocol):
@@ -108,27 +108,6 @@ POLICIES: dict[str, PolicyEntry] = {
 }
 
 
-def trained_categories() -> tuple[str, ...]:
-    """The categories that weights are shipped for."""
-    folder = Path(str(resources.files("icaf4_policy"))) / "weights"
-    return tuple(sorted(path.stem for path in folder.glob("*.safetensors")))
-
-
-def weights_path(category: str, weights: Path | None) -> Path:
-    """The weights of a category: ``{category}.safetensors`` in a folder, the shipped ones else.
-
-    Raises:
-        MissingDependencyError: torch or safetensors is not installed.
-    """
-    try:
-        from icaf4_policy.policy import shipped_weights
-    except ModuleNotFoundError as error:
-        raise MissingDependencyError(
-            f"the network needs {error.name}: pip install 'artgym[train]'"
-        ) from error
-    return shipped_weights(category) if weights is None else weights / f"{category}.safetensors"
-
-
 @functools.lru_cache(maxsize=4)
 def load_perception(category: str, weights: Path | None) -> Any:
     """The trained network of a category, loaded once a process.
@@ -137,10 +116,13 @@ def load_perception(category: str, weights: Path | None) -> Any:
         DamagedFileError: the weights are missing or damaged.
         MissingDependencyError: torch or safetensors is not installed.
     """
-    path = weights_path(category, weights)
-    from icaf4_policy.inference import Perception
-
-    return Perception.load(path, category)
+    try:
+        from icaf4_policy.inference import Perception
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError(
+            f"the network needs {error.name}: pip install 'artgym[train]'"
+        ) from error
+    return Perception.load(weights_path(category, weights), category)
 
 
 def policy_entry(name: str) -> PolicyEntry:

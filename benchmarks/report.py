@@ -58,44 +58,74 @@ def success_rate_block(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-#: Rows of the perception table: label, key of the metric, how it is shown, the paper's key.
-_PERCEPTION_ROWS: tuple[tuple[str, str, str, str | None], ...] = (
-    ("part segmentation, mIoU", "part_miou", "{:.3f}", "part_miou"),
-    ("part rotation error, deg", "part_rotation_deg", "{:.1f}", "part_rotation_deg"),
-    ("part translation error, m", "part_translation_m", "{:.4f}", None),
-    ("joint axis error, deg", "joint_axis_deg", "{:.1f}", None),
-    ("affordance, IoU of graspable", "affordance_iou", "{:.3f}", None),
-    ("affordance, mIoU", "affordance_miou", "{:.3f}", "affordance_miou"),
-    ("grasp best-match error, deg", "grasp/network/error_deg", "{:.1f}", "grasp/network/error_deg"),
-    (
-        "the same along the normal, grid roll",
-        "grasp/normal_grid_roll/error_deg",
-        "{:.1f}",
-        None,
-    ),
-    ("the same in a random hemisphere pose", "grasp/random_hemisphere/error_deg", "{:.1f}", None),
-    ("coverage at 15 deg", "grasp/network/coverage@15", "{:.2f}", None),
-    ("tries that succeed at graspable points", "label_density_graspable", "{:.3f}", None),
+#: Columns of the table of single objects: heading, metric, how it is shown.
+_OBJECT_COLUMNS: tuple[tuple[str, str, str], ...] = (
+    ("parts, mIoU", "part_miou", "{:.3f}"),
+    ("part pose: deg", "part_rotation_deg", "{:.1f}"),
+    ("m", "part_translation_m", "{:.4f}"),
+    ("% of diameter", "part_translation_percent", "{:.1f}"),
+    ("object pose: deg", "object_rotation_deg", "{:.1f}"),
+    ("m", "object_translation_m", "{:.4f}"),
+    ("joint axis, deg", "joint_axis_deg", "{:.1f}"),
+    ("affordance, IoU", "affordance_iou", "{:.3f}"),
+    ("mIoU", "affordance_miou", "{:.3f}"),
+    ("grasp error, deg", "grasp/network/error_deg", "{:.1f}"),
+    ("along the normal", "grasp/normal_grid_roll/error_deg", "{:.1f}"),
+    ("any hemisphere pose", "grasp/random_hemisphere/error_deg", "{:.1f}"),
+    ("coverage at 15 deg", "grasp/network/coverage@15", "{:.2f}"),
+    ("tries that succeed", "label_density_graspable", "{:.3f}"),
+    ("best grasp succeeds", "executed", "{:.2f}"),
 )
 
+#: Names of methods in the paper's Table 1.
+_METHOD_LABELS = {"icaf4": "", "ah_where": "AH-Where", "daisy": "DAISY", "fpfh": "FPFH"}
 
-def perception_block(result: Mapping[str, Any]) -> str:
-    """A Markdown table of ``perception.json``, the paper's figures beside ours."""
-    categories = list(result["metrics"])
-    head = "".join(f" {c} | paper |" for c in categories)
-    lines = [f"| on unseen objects |{head}", "|---|" + "---|" * (2 * len(categories))]
-    for label, key, form, paper_key in _PERCEPTION_ROWS:
-        cells = [label]
-        for category in categories:
-            cells.append(form.format(result["metrics"][category][key]))
-            paper = result["paper"].get(category, {}).get(paper_key or "")
-            cells.append("" if paper is None else f"{paper:g}")
-        lines.append("| " + " | ".join(cells) + " |")
-    objects = " and ".join(f"{len(result['objects'][c])} {c}s" for c in categories)
+
+def object_table_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``object_table.json``: a category and method a line, the paper's too."""
+    heads = [heading for heading, _, _ in _OBJECT_COLUMNS]
+    lines = ["| | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
+
+    def line(name: str, values: Mapping[str, float | None]) -> str:
+        cells = []
+        for _, key, form in _OBJECT_COLUMNS:
+            value = values.get(key)
+            cells.append("" if value is None else form.format(value))
+        return "| " + " | ".join([name, *cells]) + " |"
+
+    for category, methods in result["metrics"].items():
+        for method, values in methods.items():
+            name = f"{category} {_METHOD_LABELS[method]}".strip()
+            lines.append(line(name, values))
+            paper = result["paper"].get(method, {}).get(category)
+            if paper:
+                lines.append(line(f"{name}, paper", paper))
+    views = ", ".join(f"{count} {category}" for category, count in result["views"].items())
     lines += [
         "",
-        f"{objects}, {sum(result['views'].values())} views. The paper's figures are of other "
-        "objects and pictures, and leave the grasp error undefined: a place to stand, no contest.",
+        f"Views: {views}. The paper's figures are of other objects and pictures, and leave the "
+        "grasp error undefined: a place to stand, no contest.",
+    ]
+    return "\n".join(lines)
+
+
+def scene_table_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``scene_table.json``: mean average precision, the paper's beneath."""
+    columns = list(result["rows"]["mean"])
+    lines = ["| | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]
+    for category, row in result["rows"].items():
+        cells = [f"{row[column]:.3f}" for column in columns]
+        lines.append("| " + " | ".join([category, *cells]) + " |")
+        paper = result["paper"].get(category)
+        if paper:
+            cells = [f"{paper[column]:.2f}" for column in columns]
+            lines.append("| " + " | ".join([f"{category}, paper", *cells]) + " |")
+    detector = result["detector"]
+    lines += [
+        "",
+        f"{sum(result['objects'].values())} objects in {result['config']['scenes']} scenes. The "
+        f"detector alone: mask mAP50 {detector['mask/map50']:.3f}, mAP75 "
+        f"{detector['mask/map75']:.3f}; box mAP50 {detector['box/map50']:.3f}.",
     ]
     return "\n".join(lines)
 
@@ -338,7 +368,8 @@ def rl_baselines_block(result: Mapping[str, Any]) -> str:
 
 BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "success_rate": success_rate_block,
-    "perception": perception_block,
+    "object_table": object_table_block,
+    "scene_table": scene_table_block,
     "objects": objects_block,
     "variety": variety_block,
     "solvability": solvability_block,

@@ -22,8 +22,9 @@ from benchmarks.command import run
 from benchmarks.episodes import EpisodeRecord, EpisodeTask, episode_tasks, outcomes, run_in_worker
 from benchmarks.parallel import results_in_order
 from benchmarks.pictures import PicturesTask, require_film_writer, take_pictures
-from benchmarks.policies import POLICIES, load_perception, policy_entry, trained_categories
+from benchmarks.policies import POLICIES, load_perception, policy_entry
 from benchmarks.rates import aggregate
+from icaf4_policy.shipped import trained_categories
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,29 +1,58 @@
-"""The trained network against labelled views of one object, and its best grasp in physics."""
+"""Trained networks against labelled views of one object, and their best grasps in physics."""
 
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from artgym.annotation.annotate import positions_at
 from artgym.annotation.trial import try_grasp
 from artgym.datasets.generate import GenerationConfig, make_pictures
-from artgym.datasets.sample import Sample
+from artgym.datasets.sample import JOINT_NONE, JOINT_PRISMATIC, Picture, Sample
 from artgym.geometry.transforms import invert, transform_from
 from artgym.objects import catalog
+from benchmarks.constrained_fit import ConstrainedFitConfig, fit_parts
 from benchmarks.policies import load_perception
 
 if TYPE_CHECKING:
     from icaf4_policy.inference import Prediction
+    from icaf4_policy.pose_fitting import PoseFit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Method:
+    """A row of the paper's Table 1.
+
+    Attributes:
+        label: as it is printed.
+        optimizer: whether parts are fitted by the joint-constrained optimizer; there is no pose of
+            the object then.
+    """
+
+    label: str
+    optimizer: bool = False
+
+
+#: The rows; each has weights of its own, which say what they read and how they propose grasps.
+METHODS: Mapping[str, Method] = {
+    "icaf4": Method(label="ICAF-4"),
+    "ah_where": Method(label="AH-Where", optimizer=True),
+    "daisy": Method(label="DAISY"),
+    "fpfh": Method(label="FPFH"),
+}
+
+#: Of the optimizer: it takes a second or so a view.
+_OPTIMIZER = ConstrainedFitConfig(hypotheses=50)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ViewsTask:
-    """Which object is looked at, from how many places.
+    """Which object is looked at, from how many places, by whom.
 
     Attributes:
         category: chooses the weights.
@@ -31,38 +60,78 @@ class ViewsTask:
         views: pictures of each labelled joint state.
         seed: of the views, the choice of points and the chance rows.
         label_root: folder of labels; None for the shipped ones.
-        weights: folder with ``{category}.safetensors``; None for the shipped ones.
+        methods: of ``METHODS``, the folder with ``{category}.safetensors`` of each; None for the
+            shipped weights.
     """
 
     category: str
     object_id: str
     views: int
     seed: int
-    label_root: Path | None = None
-    weights: Path | None = None
+    label_root: Path | None
+    methods: Mapping[str, Path | None]
 
 
-def score_views(task: ViewsTask) -> list[dict[str, float]]:
-    """A row of metrics a view.
+def score_views(task: ViewsTask) -> dict[str, list[dict[str, float]]]:
+    """For each method a row of metrics a view, the views being the same for all.
 
-    Those of ``evaluate_sample``, lengths in object diameters, and "executed": whether the
-    network's best grasp, tried in physics as the labels were, moves the part that it names.
+    The metrics are those of ``evaluate_sample``, lengths in object diameters, and "executed":
+    whether the best grasp, tried in physics as the labels were, moves the part that it names.
     """
+    config = GenerationConfig(views=task.views, seed=task.seed)
+    pictures = make_pictures(task.object_id, config, task.label_root)
+    return {
+        method: [
+            _score(load_perception(task.category, weights), picture, METHODS[method], task, number)
+            for number, picture in enumerate(pictures)
+        ]
+        for method, weights in task.methods.items()
+    }
+
+
+def _score(
+    perception: Any, picture: Picture, method: Method, task: ViewsTask, number: int
+) -> dict[str, float]:
+    from icaf4_policy.backbone.classical import described
+
     from icaf4_policy.evaluation import evaluate_sample
 
-    perception = load_perception(task.category, task.weights)
-    config = GenerationConfig(views=task.views, seed=task.seed)
-    rows = []
-    pictures = make_pictures(task.object_id, config, task.label_root)
-    for number, sample in enumerate(s for picture in pictures for s in picture.samples):
-        rng = np.random.default_rng([task.seed, zlib.crc32(task.object_id.encode()), number])
-        row, prediction = evaluate_sample(perception, sample, rng)
-        for name in ("part_translation", "object_translation", "joint_pivot"):
-            metres = row.get(f"{name}_m", float("nan"))
-            row[f"{name}_percent"] = 100.0 * metres / float(sample.object_scale)
-        row["executed"] = float(_succeeds(prediction, sample))
-        rows.append(row)
-    return rows
+    rng = np.random.default_rng([task.seed, zlib.crc32(task.object_id.encode()), number])
+    (sample,) = picture.samples
+    sample = described(picture, sample, perception.model.config.features)
+    refit = (lambda prediction: _optimized(prediction, rng)) if method.optimizer else None
+    row, prediction = evaluate_sample(perception, sample, rng, refit=refit)
+    for name in ("part_translation", "object_translation", "joint_pivot"):
+        metres = row.get(f"{name}_m", float("nan"))
+        row[f"{name}_percent"] = 100.0 * metres / float(sample.object_scale)
+    row["executed"] = float(_succeeds(prediction, sample))
+    return row
+
+
+def _optimized(prediction: Prediction, rng: np.random.Generator) -> Prediction:
+    """The same with its parts fitted by the optimizer, as far as base and joints were found."""
+    boxes: list[PoseFit | None] = list(prediction.part_boxes)
+    base = boxes[0]
+    parts = [
+        k
+        for k, (box, joint) in enumerate(zip(boxes, prediction.joints, strict=True))
+        if box is not None and (k == 0 or joint.joint_type != JOINT_NONE)
+    ]
+    if base is not None and len(parts) > 1:
+        on_part = [prediction.part == k for k in parts]
+        joints = [prediction.joints[k] for k in parts[1:]]
+        R_camera_base = base.T_camera_box[:3, :3]
+        fits = fit_parts(
+            [prediction.npcs[on] for on in on_part],
+            [prediction.points_camera[on] for on in on_part],
+            ["prismatic" if j.joint_type == JOINT_PRISMATIC else "revolute" for j in joints],
+            np.stack([joint.axis_camera for joint in joints]) @ R_camera_base,
+            rng,
+            _OPTIMIZER,
+        )
+        for k, fit in zip(parts, fits, strict=True):
+            boxes[k] = fit
+    return replace(prediction, part_boxes=tuple(boxes), object_boxes=(None,) * len(boxes))
 
 
 def _succeeds(prediction: Prediction, sample: Sample) -> bool:

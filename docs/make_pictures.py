@@ -21,10 +21,9 @@ from artgym.datasets.generate import generate_reartmix
 from artgym.show.label_view import show_labels
 from artgym.show.object_view import show_object
 from artgym.show.sample_view import show_sample
-from benchmarks.policies import trained_categories
-from icaf4_policy.drawing import draw_prediction
+from icaf4_policy.drawing import draw_predictions
 from icaf4_policy.inference import Perception
-from icaf4_policy.policy import shipped_weights
+from icaf4_policy.shipped import trained_categories, weights_path
 
 PICTURES = Path(__file__).parent / "pictures"
 
@@ -36,7 +35,7 @@ def perceived(category: str, seed: int = 0) -> np.ndarray:
     )
     observation, _ = env.reset(seed=seed)
     frame = CameraFrame.from_observation(observation)
-    prediction, _ = Perception.load(shipped_weights(category)).perceive(
+    prediction, _ = Perception.load(weights_path(category)).perceive(
         frame.rgb,
         frame.depth,
         frame.intrinsics,
@@ -44,7 +43,7 @@ def perceived(category: str, seed: int = 0) -> np.ndarray:
         rng=np.random.default_rng(seed),
     )
     env.close()
-    panels = draw_prediction(frame.rgb, frame.intrinsics, prediction, num_grasps=8)
+    panels = draw_predictions(frame.rgb, frame.intrinsics, [prediction], num_grasps=8)
     return np.concatenate([frame.rgb, panels], axis=1)
 
 

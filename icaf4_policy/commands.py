@@ -20,7 +20,8 @@ from artgym.errors import InvalidArgumentError
 from icaf4_policy import drawing
 from icaf4_policy.checkpoint import description_path
 from icaf4_policy.detector.config import DetectorTrainingConfig
-from icaf4_policy.inference import Perception
+from icaf4_policy.inference import Perception, Prediction
+from icaf4_policy.shipped import weights_path
 from icaf4_policy.training import TrainingConfig
 from icaf4_policy.training import train as run_training
 
@@ -138,10 +139,10 @@ def _pictures(data: Path, split: str) -> Iterator[Picture]:
 
 def predict(
     *,
-    weights: Path,
     rgb: Path,
     depth: Path,
     intrinsics: Path,
+    weights: Path | None = None,
     category: str | None = None,
     picture: Path = Path("prediction.png"),
     depth_unit_m: float = 0.001,
@@ -150,32 +151,53 @@ def predict(
 ) -> int:
     """Look at one RGB-D image: print what is there as JSON, and draw it.
 
+    With a category or weights, what stands on the table is taken for one object of that category;
+    without, the shipped detector says what is there.
+
     Args:
-        weights: trained weights, .safetensors.
         rgb: colour image.
         depth: 16-bit image in units of depth_unit_m, or .npy in metres; 0 where unknown.
         intrinsics: text or JSON file with the 3x3 camera matrix.
-        category: of the object, where the weights are for several.
+        weights: trained weights of one object's network, .safetensors; by default the shipped ones.
+        category: of the object; weights for a single one need none.
         picture: where to draw parts, affordance and the best grasps.
         depth_unit_m: metres of one unit of a depth image.
-        grasps: how many proposals to print and draw.
+        grasps: how many proposals an object to print and draw.
         seed: of the fits and the choice of points.
     """
     torch.set_num_threads(1)
     if grasps < 0:
         raise InvalidArgumentError(f"grasps={grasps} must be at least 0.")
     image, K = drawing.read_rgb(rgb), drawing.read_intrinsics(intrinsics)
-    metres = drawing.read_depth(depth, depth_unit_m)
-    perception = Perception.load(weights, category)
-    prediction, view = perception.perceive(image, metres, K, rng=np.random.default_rng(seed))
-    drawing.write_image(picture, drawing.draw_prediction(image, K, prediction, grasps))
-    best = prediction.grasps
-    parts = zip(prediction.part_boxes, prediction.joints, strict=True)
-    report: dict[str, Any] = {
-        "category": perception.category,
-        "picture": str(picture),
-        "pixels": int(view.mask.sum()),
-        "up_camera": view.up_camera.tolist(),
+    metres, rng = drawing.read_depth(depth, depth_unit_m), np.random.default_rng(seed)
+    objects: list[dict[str, Any]] = []
+    if weights is None and category is None:
+        # torchvision takes long to import, and only this way needs it.
+        from icaf4_policy.scenes import ScenePerception
+
+        seen = ScenePerception.load().look(image, metres, K, rng=rng)
+        predictions = [each.prediction for each in seen]
+        for each in seen:
+            found = each.detection
+            about = {"category": found.category, "score": found.score, "box": found.box.tolist()}
+            objects.append(about | {"pixels": int((each.part_mask > 0).sum())})
+    else:
+        perception = Perception.load(weights or weights_path(category or ""), category)
+        prediction, view = perception.perceive(image, metres, K, rng=rng)
+        predictions = [prediction]
+        objects.append({"category": perception.category, "pixels": int(view.mask.sum())})
+    drawing.write_image(picture, drawing.draw_predictions(image, K, predictions, grasps))
+    for about, prediction in zip(objects, predictions, strict=True):
+        about |= _described(prediction, grasps)
+    print(json.dumps({"picture": str(picture), "objects": objects}, indent=2))
+    return 0
+
+
+def _described(prediction: Prediction, grasps: int) -> dict[str, Any]:
+    """What is printed of a prediction."""
+    best, parts = prediction.grasps, zip(prediction.part_boxes, prediction.joints, strict=True)
+    return {
+        "up_camera": prediction.R_level_camera[2].tolist(),
         "parts": [
             {
                 "part": k,
@@ -195,8 +217,6 @@ def predict(
             for i in range(min(grasps, len(best.scores)))
         ],
     }
-    print(json.dumps(report, indent=2))
-    return 0
 
 
 def _json_fields(record: Any) -> dict[str, Any]:

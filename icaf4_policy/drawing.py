@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -74,24 +75,38 @@ def write_image(path: Path, image: NDArray[np.uint8]) -> None:
         raise InvalidArgumentError(f"picture={str(path)!r} cannot be written ({error}).") from error
 
 
-def draw_prediction(
-    rgb: ArrayLike, intrinsics: ArrayLike, prediction: Prediction, num_grasps: int
+def draw_predictions(
+    rgb: ArrayLike, intrinsics: ArrayLike, predictions: Sequence[Prediction], num_grasps: int
 ) -> NDArray[np.uint8]:
     """Three panels side by side: parts, affordance, best grasps and joint axes.
 
     Args:
         rgb: uint8 (H, W, 3), the image that was looked at.
         intrinsics: (3, 3).
-        prediction: what is drawn.
-        num_grasps: how many of the proposals.
+        predictions: what is drawn, an object each.
+        num_grasps: how many of the proposals of each.
 
     Returns:
-        uint8 (H, 3 W, 3). The best grasp is green, joint axes are yellow.
+        uint8 (H, 3 W, 3). The best grasp of an object is green, joint axes are yellow.
     """
     rgb = np.asarray(rgb, dtype=np.uint8)
     panels = [Image.fromarray(rgb // 2) for _ in range(3)]
-    parts, affordance, grasps = (ImageDraw.Draw(panel) for panel in panels)
-    width = max(1, rgb.shape[1] // 200)
+    drawn = [ImageDraw.Draw(panel) for panel in panels]
+    for prediction in predictions:
+        _draw(*drawn, np.asarray(intrinsics), prediction, num_grasps, max(1, rgb.shape[1] // 200))
+    return np.concatenate([np.asarray(panel) for panel in panels], axis=1)
+
+
+def _draw(
+    parts: ImageDraw.ImageDraw,
+    affordance: ImageDraw.ImageDraw,
+    grasps: ImageDraw.ImageDraw,
+    intrinsics: NDArray[np.floating],
+    prediction: Prediction,
+    num_grasps: int,
+    width: int,
+) -> None:
+    """One object into the three panels."""
     corners = project(prediction.points_camera, intrinsics)
     for (u, v), part, value in zip(
         corners.tolist(), prediction.part, prediction.affordance, strict=True
@@ -108,4 +123,3 @@ def draw_prediction(
         T_camera_grasp = transform_from(proposals.R_camera_grasp[i], proposals.points_camera[i])
         for line in hand_lines(T_camera_grasp):
             draw_line(grasps, line, intrinsics, _GRASP_COLOR if i else _BEST_COLOR, width)
-    return np.concatenate([np.asarray(panel) for panel in panels], axis=1)

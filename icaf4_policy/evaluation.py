@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +34,12 @@ def true_object_boxes(sample: Sample) -> Array:
 
 
 def evaluate_sample(
-    perception: Perception, sample: Sample, rng: np.random.Generator, *, top: int = 10
+    perception: Perception,
+    sample: Sample,
+    rng: np.random.Generator,
+    *,
+    top: int = 10,
+    refit: Callable[[Prediction], Prediction] | None = None,
 ) -> tuple[dict[str, float], Prediction]:
     """Every metric of one view, from the points of the sample's object.
 
@@ -41,6 +48,7 @@ def evaluate_sample(
         sample: a labelled view.
         rng: for the choice of points, the fits and the chance rows.
         top: J, proposals a point that coverage counts.
+        refit: what another way to fit poses makes of a prediction.
 
     Returns:
         A row for ``metrics.mean_rows``, and the prediction that it is of; NaN where a metric does
@@ -50,6 +58,8 @@ def evaluate_sample(
     """
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
     prediction = perception.predict(*seen, rng=rng)
+    if refit is not None:
+        prediction = refit(prediction)
     row = _part_metrics(prediction, sample) | _joint_metrics(prediction, sample)
 
     truth = sample.affordance[prediction.point_index]

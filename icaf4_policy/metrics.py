@@ -129,6 +129,26 @@ def label_density(successful_tries: ArrayLike) -> tuple[float, float]:
     return (float(tries.mean()) if tries.size else float("nan")), within
 
 
+def interpolated_precision(scores: ArrayLike, hits: ArrayLike, count: int) -> float:
+    """Average precision: the area under precision over recall, precision made to fall only.
+
+    Args:
+        scores: (n,), how sure each claim is.
+        hits: bool (n,), whether it is right.
+        count: how many hits would be complete.
+
+    Returns:
+        In [0, 1]; NaN where there is nothing to be found.
+    """
+    if not count:
+        return float("nan")
+    order = np.argsort(-np.asarray(scores, dtype=float), kind="stable")
+    right = np.cumsum(np.asarray(hits, dtype=bool)[order])
+    precision = right / np.arange(1, len(right) + 1)
+    highest_beyond = np.maximum.accumulate(precision[::-1])[::-1]
+    return float(np.sum(highest_beyond * np.diff(right, prepend=0)) / count)
+
+
 def mean_rows(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
     """Mean of each entry over the rows that have it; NaN entries are left out."""
     values: dict[str, list[float]] = {}

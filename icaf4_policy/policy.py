@@ -7,7 +7,6 @@ the camera, the hand's own pose and width, and the index of the part to move.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from artgym.geometry.camera import points_from_depth
 from artgym.geometry.grasps import T_GRASP_TCP
 from artgym.geometry.rotations import frame_from_z, grasp_angle
 from icaf4_policy.inference import Perception, Prediction
+from icaf4_policy.shipped import weights_path
 
 Array = NDArray[np.floating]
 
@@ -36,11 +36,6 @@ _FULL_SLIDE, _FULL_TURN = 0.5, 2.6
 
 #: A proposal this near to one that failed (metres, radians) is passed over.
 _SAME_POSITION, _SAME_ANGLE = 0.015, float(np.radians(20.0))
-
-
-def shipped_weights(category: str) -> Path:
-    """The weights that come with the package for a category."""
-    return Path(str(resources.files("icaf4_policy"))) / "weights" / f"{category}.safetensors"
 
 
 class Icaf4Policy:
@@ -64,7 +59,7 @@ class Icaf4Policy:
         Raises:
             DamagedFileError: the weights are missing or damaged.
         """
-        return cls(Perception.load(weights or shipped_weights(category), category))
+        return cls(Perception.load(weights or weights_path(category), category))
 
     def reset(self, seed: int) -> None:
         """Forgets the last episode."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,7 @@ from artgym.datasets.sample import level_from_camera
 from artgym.geometry.camera import points_from_depth
 from icaf4_policy.detector.inference import Detection, Detector
 from icaf4_policy.inference import Perception, Prediction
+from icaf4_policy.shipped import DETECTOR, weights_path
 from icaf4_policy.tabletop import HEIGHT_ABOVE_TABLE, MIN_OBJECT_POINTS, fit_table
 
 Array = NDArray[np.floating]
@@ -46,6 +48,26 @@ class ScenePerception:
 
     detector: Detector
     perceptions: Mapping[str, Perception]
+
+    @classmethod
+    def load(cls, weights: Path | None = None) -> ScenePerception:
+        """The detector and the networks of all categories that it finds.
+
+        Args:
+            weights: folder with detector.safetensors and {category}.safetensors; None for the
+                shipped ones.
+
+        Raises:
+            DamagedFileError: weights are missing or damaged.
+        """
+        detector = Detector.load(weights_path(DETECTOR, weights))
+        return cls(
+            detector=detector,
+            perceptions={
+                category: Perception.load(weights_path(category, weights), category)
+                for category in detector.model.config.categories
+            },
+        )
 
     def look(
         self,

@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pycocotools import mask as run_lengths
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
@@ -17,7 +19,40 @@ from artgym.datasets.sample import Picture
 from icaf4_policy.detector.inference import Detection, Detector
 
 #: Detections less certain than this do not count.
-_LOWEST_SCORE = 0.05
+LOWEST_SCORE = 0.05
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outline:
+    """What average precision needs to know of an object, its mask run-length encoded.
+
+    Attributes:
+        category: "drawer", ...
+        score: probability of it, in [0, 1]; 1 of what is there.
+        box: float32 (4,), left, top, width and height in pixels.
+        size: (height, width) of the picture.
+        runs: of the mask, as pycocotools writes them.
+    """
+
+    category: str
+    score: float
+    box: NDArray[np.float32]
+    size: tuple[int, int]
+    runs: Any
+
+
+def outlines(detections: Iterable[Detection]) -> list[Outline]:
+    """Those of the detections of one picture."""
+    return [
+        Outline(
+            category=each.category,
+            score=each.score,
+            box=each.box,
+            size=(each.mask.shape[0], each.mask.shape[1]),
+            runs=run_lengths.encode(np.asfortranarray(each.mask, dtype=np.uint8)),
+        )
+        for each in detections
+    ]
 
 
 def evaluate(detector: Detector, pictures: Iterable[Picture]) -> dict[str, float]:
@@ -29,8 +64,9 @@ def evaluate(detector: Detector, pictures: Iterable[Picture]) -> dict[str, float
     """
     truths, found = [], []
     for picture in tqdm(pictures, desc="evaluation", unit="picture", leave=False, disable=None):
-        truths.append(true_detections(picture))
-        found.append(detector.detect(picture.rgb, picture.depth, min_score=_LOWEST_SCORE))
+        truths.append(outlines(true_detections(picture)))
+        detections = detector.detect(picture.rgb, picture.depth, min_score=LOWEST_SCORE)
+        found.append(outlines(detections))
     return average_precision(truths, found)
 
 
@@ -48,7 +84,7 @@ def true_detections(picture: Picture) -> list[Detection]:
 
 
 def average_precision(
-    truths: Sequence[Sequence[Detection]], found: Sequence[Sequence[Detection]]
+    truths: Sequence[Sequence[Outline]], found: Sequence[Sequence[Outline]]
 ) -> dict[str, float]:
     """Average precision over the recall levels, the categories and the overlaps.
 
@@ -83,25 +119,24 @@ def average_precision(
     return row
 
 
-def _coco(pictures: Sequence[Sequence[Detection]], categories: Sequence[str]) -> COCO:
+def _coco(pictures: Sequence[Sequence[Outline]], categories: Sequence[str]) -> COCO:
     """Detections as a COCO data set; those of other categories count for nothing."""
     images: list[Any] = []
     annotations: list[Any] = []
     for image, objects in enumerate(pictures):
-        height, width = objects[0].mask.shape if objects else (0, 0)
+        height, width = objects[0].size if objects else (0, 0)
         images.append({"id": image, "height": height, "width": width})
         for each in objects:
             if each.category not in categories:
                 continue
-            encoded = run_lengths.encode(np.asfortranarray(each.mask, dtype=np.uint8))
             annotations.append(
                 {
                     "id": len(annotations) + 1,
                     "image_id": image,
                     "category_id": categories.index(each.category),
                     "bbox": each.box.tolist(),
-                    "segmentation": encoded,
-                    "area": float(run_lengths.area(encoded)),
+                    "segmentation": each.runs,
+                    "area": float(run_lengths.area(each.runs)),
                     "iscrowd": 0,
                     "score": each.score,
                 }

@@ -219,9 +219,10 @@ def test_predict_command(perception, picture, tmp_path, capsys):
     arguments += ["--depth", tmp_path / "depth.png", "--intrinsics", tmp_path / "K.json"]
     arguments += ["--picture", tmp_path / "seen.png", "--grasps", 3]
     assert cli.main([str(a) for a in arguments]) == 0
-    report = json.loads(capsys.readouterr().out)
-    assert report["category"] == "toy"
-    assert len(report["grasps"]) == 3
+    (seen,) = json.loads(capsys.readouterr().out)["objects"]
+    assert seen["category"] == "toy"
+    assert len(seen["grasps"]) == 3
+    assert len(seen["parts"]) == 2
     assert read_rgb(tmp_path / "seen.png").shape == (120, 480, 3)
 
 

@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from icaf4_policy.detector.evaluation import average_precision, true_detections
+from icaf4_policy.detector.evaluation import average_precision, outlines, true_detections
 from tests.icaf4_policy.detector.scene import scene
 
-TRUTHS = [true_detections(scene(i)) for i in range(3)]
+TRUTHS = [outlines(true_detections(scene(i))) for i in range(3)]
 
 
 def test_the_truth_scores_one():

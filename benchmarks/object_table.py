@@ -1,0 +1,277 @@
+"""Single objects that no network has seen: the paper's Table 1, baselines and chance included.
+
+Run ``python -m benchmarks.perception table1 --help``.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from artgym.annotation.annotate import labelled_ids
+from artgym.datasets.sets import SETS
+from artgym.errors import InvalidArgumentError
+from artgym.objects import catalog
+from artgym.sim.renderer import find_device
+from benchmarks import record
+from benchmarks.command import run
+from benchmarks.paper import TABLE_1
+from benchmarks.parallel import results_in_order
+from benchmarks.policies import load_perception
+from benchmarks.views import METHODS, ViewsTask, score_views
+from icaf4_policy.metrics import CHANCE_ROWS, COVERAGE_DEG, PRECISION_DEG, mean_rows
+from icaf4_policy.shipped import trained_categories
+
+#: Columns of the printed tables: metric, heading, decimals.
+_COLUMNS = (
+    ("part_miou", "parts: mIoU", 3),
+    ("parts_found", "found", 3),
+    ("part_rotation_deg", "rotation, deg", 1),
+    ("part_translation_m", "translation, m", 4),
+    ("part_translation_percent", "% of diameter", 1),
+    ("object_rotation_deg", "object: rotation, deg", 1),
+    ("object_translation_m", "translation, m", 4),
+    ("object_translation_percent", "% of diameter", 1),
+    ("affordance_iou", "affordance: IoU", 3),
+    ("affordance_miou", "mIoU", 3),
+    ("grasp/network/error_deg", "grasp: error, deg", 1),
+    (f"grasp/network/coverage@{COVERAGE_DEG}", f"covered at {COVERAGE_DEG} deg", 2),
+    ("executed", "executed", 2),
+)
+
+#: Metrics that say more about the network; kept beside the columns.
+_MORE = (
+    "joint_type_accuracy",
+    "joint_axis_deg",
+    "joint_pivot_m",
+    "joint_pivot_percent",
+    "grasp_points_called",
+    "label_density",
+    "label_density_graspable",
+)
+
+#: What is promised of the network, of every category and of their mean: least or most.
+TARGETS: Mapping[str, tuple[str, float]] = {
+    "part_miou": (">=", 0.95),
+    "part_rotation_deg": ("<=", 3.0),
+    "part_translation_m": ("<=", 0.03),
+    "part_translation_percent": ("<=", 5.0),
+    "object_rotation_deg": ("<=", 3.0),
+    "object_translation_m": ("<=", 0.03),
+    "object_translation_percent": ("<=", 5.0),
+    "affordance_iou": (">=", 0.9),
+    "grasp/network/error_deg": ("<=", 10.0),
+    f"grasp/network/coverage@{COVERAGE_DEG}": (">=", 0.5),
+    "executed": (">=", 0.75),
+}
+
+#: The row of the means over the categories of the paper's table.
+MEAN = "mean of ArtImage"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObjectTableConfig:
+    """How well are single objects seen that no network has seen before?
+
+    Attributes:
+        category: categories of objects; by default those with shipped weights.
+        split: whose labelled objects are looked at; choose on "val", never on "test".
+        objects: how many at most, the first that have labels; None for all.
+        views: pictures of each labelled joint state.
+        seed: of the views, the choice of points and the chance rows.
+        workers: processes; the numbers do not depend on it.
+        weights: folder with {category}.safetensors, instead of the shipped weights.
+        baselines: folder with {method}/{category}.safetensors for the methods fpfh, daisy and
+            ah_where, which `benchmarks.baselines` trains; without one, only the network and the
+            rows of chance are measured.
+        labels: folder with {category}/{split}, instead of the shipped labels.
+        out: folder for object_table.json.
+    """
+
+    category: tuple[str, ...] = field(default_factory=trained_categories)
+    split: catalog.Split = "test"
+    objects: int | None = None
+    views: int = 4
+    seed: int = 0
+    workers: int = 2
+    weights: Path | None = None
+    baselines: Path | None = None
+    labels: Path | None = None
+    out: Path = record.RESULTS_FOLDER
+
+    def __post_init__(self) -> None:
+        for name in ("objects", "views", "workers"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise InvalidArgumentError(f"{name}={value}: expected 1 or more.")
+        for category in self.category:
+            catalog.category(category)
+
+    def weights_of(self, category: str) -> dict[str, Path | None]:
+        """The folder of each method's weights for a category; None for the shipped ones."""
+        folders = {"icaf4": self.weights and self.weights.absolute()}
+        for method in METHODS:
+            folder = (self.baselines or Path()).absolute() / method
+            if self.baselines and (folder / f"{category}.safetensors").exists():
+                folders[method] = folder
+        return folders
+
+
+def measure(config: ObjectTableConfig) -> dict[str, Any]:
+    """Looks at all objects; a result for ``record.write_result``.
+
+    Raises:
+        InvalidArgumentError: a category has no labelled objects.
+        RendererUnavailableError: no device here can render.
+        DamagedFileError: weights or labels are missing or damaged.
+    """
+    began = time.perf_counter()
+    find_device()
+    tasks = []
+    for category in config.category:
+        methods = config.weights_of(category)
+        for folder in methods.values():
+            load_perception(category, folder)
+        ids = labelled_ids(category, config.split, config.labels)[: config.objects]
+        if not ids:
+            raise InvalidArgumentError(
+                f"no labels for {category}/{config.split}: run `artgym annotate --category "
+                f"{category} --split {config.split}` first."
+            )
+        tasks += [
+            ViewsTask(
+                category=category,
+                object_id=object_id,
+                views=config.views,
+                seed=config.seed,
+                label_root=config.labels and config.labels.absolute(),
+                methods=methods,
+            )
+            for object_id in ids
+        ]
+    rows = results_in_order(
+        score_views, tasks, workers=config.workers, description="perception", unit="object"
+    )
+    scored = list(zip(tasks, rows, strict=True))
+    metrics = {
+        category: {
+            method: _rounded(
+                mean_rows(row for t, r in scored if t.category == category for row in r[method])
+            )
+            for method in config.weights_of(category)
+        }
+        for category in config.category
+    }
+    return {
+        **record.provenance("benchmarks.perception"),
+        "config": asdict(config),
+        "seconds": round(time.perf_counter() - began, 1),
+        "targets": dict(TARGETS),
+        "views": {
+            c: sum(len(r["icaf4"]) for t, r in scored if t.category == c) for c in config.category
+        },
+        "metrics": metrics | _means(metrics),
+        "by_object": {
+            task.object_id: {
+                name: value
+                for name, value in _rounded(mean_rows(row["icaf4"])).items()
+                if name in _MORE or any(name == column for column, _, _ in _COLUMNS)
+            }
+            for task, row in scored
+        },
+        "paper": TABLE_1,
+    }
+
+
+def _means(
+    metrics: Mapping[str, Mapping[str, Mapping[str, float]]],
+) -> dict[str, dict[str, dict[str, float]]]:
+    """The mean over the paper's categories, if all are there, of each method that has all."""
+    if not set(SETS["artimage"]) <= set(metrics):
+        return {}
+    mine = [metrics[category] for category in SETS["artimage"]]
+    shared = [method for method in mine[0] if all(method in row for row in mine)]
+    return {MEAN: {m: _rounded(mean_rows(row[m] for row in mine)) for m in shared}}
+
+
+def _rounded(row: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(value, 5) for name, value in row.items()}
+
+
+def category_table(category: str, result: Mapping[str, Any]) -> Table:
+    """All methods on one category, the paper's rows beneath ours, chance, and what is promised."""
+    title = f"{category}: unseen objects; paper: ArtImage, other objects"
+    table = Table(title=title)
+    table.add_column("method")
+    for _, heading, _ in _COLUMNS:
+        table.add_column(heading, justify="right")
+    for method, values in result["metrics"][category].items():
+        table.add_row(METHODS[method].label, *_cells(values))
+        paper = result["paper"][method].get(category)
+        if paper:
+            # The paper's translations are in another unit.
+            table.add_row("  paper", *_cells(paper), style="dim")
+    ours = result["metrics"][category]["icaf4"]
+    for name in CHANCE_ROWS:
+        row = {
+            key.replace(f"/{name}/", "/network/"): value
+            for key, value in ours.items()
+            if key.startswith(f"grasp/{name}/")
+        }
+        table.add_row(name.replace("_", " "), *_cells(row))
+    promised = [" ".join(map(str, TARGETS.get(name, ()))) for name, _, _ in _COLUMNS]
+    table.add_row("promised", *promised, style="bold")
+    return table
+
+
+def _cells(values: Mapping[str, float]) -> list[str]:
+    return [_cell(values.get(name), decimals) for name, _, decimals in _COLUMNS]
+
+
+def _cell(value: float | None, decimals: int) -> str:
+    """A number; a dash where there is none."""
+    return "-" if value is None or math.isnan(value) else f"{value:.{decimals}f}"
+
+
+def grasp_table(metrics: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
+    """The network's grasps beside those of chance, at the points of ``evaluate_sample``."""
+    table = Table(title="grasps of ICAF-4 at graspable points")
+    for name in ("category", "points", "proposals from"):
+        table.add_column(name)
+    table.add_column("error, deg", justify="right")
+    for degrees in PRECISION_DEG:
+        table.add_column(f"within {degrees} deg", justify="right")
+    table.add_column(f"covered at {COVERAGE_DEG} deg", justify="right")
+    keys = ["error_deg", *(f"precision@{d}" for d in PRECISION_DEG), f"coverage@{COVERAGE_DEG}"]
+    for category, methods in metrics.items():
+        values = methods["icaf4"]
+        for prefix, points in (("grasp", "graspable, called so"), ("grasp_calls", "all calls")):
+            for source in ("network", *CHANCE_ROWS):
+                row = {key: values.get(f"{prefix}/{source}/{key}") for key in keys}
+                cells = [_cell(value, 1 if key == "error_deg" else 3) for key, value in row.items()]
+                table.add_row(category, points, source, *cells)
+    return table
+
+
+def tables_from_result(result: Mapping[str, Any]) -> Iterable[Table]:
+    """The tables for a person to read."""
+    metrics = result["metrics"]
+    return [*(category_table(category, result) for category in metrics), grasp_table(metrics)]
+
+
+def report(config: ObjectTableConfig) -> Iterable[Table]:
+    """Measures, writes ``object_table.json`` and gives the tables."""
+    result = measure(config)
+    record.write_result(config.out / "object_table.json", result)
+    return tables_from_result(result)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the benchmark; see ``benchmarks.command.run``."""
+    return run("object_table", ObjectTableConfig, report, arguments)
