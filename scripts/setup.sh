@@ -10,7 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 VENV=.venv
 LOG=$VENV/setup.log
 STAMP=$VENV/setup.stamp
-EXTRAS=train,rl,video,assets,mjcf,cluster,dev
+EXTRAS=train,baselines,rl,video,assets,mjcf,cluster,dev
 
 say() { printf '[setup] %s\n' "$*"; }
 

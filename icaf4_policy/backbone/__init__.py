@@ -1,1 +1,1 @@
-"""The point-cloud backbone and the compiled neighbourhood searches below it."""
+"""The point-cloud backbone, its neighbourhood searches, and the classical descriptors."""
