@@ -8,14 +8,24 @@ center. It gives the output of ``icaf4_policy.backbone.pointnet2``, whose layers
 from __future__ import annotations
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional as F
 
+from artgym.errors import InvalidArgumentError
 from icaf4_policy.backbone.pointnet2 import FeaturePropagation, PointNet2, SetAbstraction
 
 
-def plain_features(backbone: PointNet2, points: Tensor, features: Tensor) -> Tensor:
-    """What ``backbone(points, features)`` gives in evaluation mode: (B, N, width_out)."""
+def plain_features(backbone: nn.Module, points: Tensor, features: Tensor) -> Tensor:
+    """What ``backbone(points, features)`` gives in evaluation mode: (B, N, width_out).
+
+    Raises:
+        InvalidArgumentError: the backbone is another than ``PointNet2``.
+    """
+    if not isinstance(backbone, PointNet2):
+        raise InvalidArgumentError(
+            f"backbone is {type(backbone).__name__}, expected PointNet2: take weights of "
+            "features='color'."
+        )
     return torch.stack(
         [_of_cloud(backbone, xyz, own) for xyz, own in zip(points, features, strict=True)]
     )

@@ -18,6 +18,7 @@ from artgym.datasets.picture_files import PictureFolder, SampleFolder
 from artgym.datasets.sample import Picture, Sample
 from artgym.errors import InvalidArgumentError
 from icaf4_policy import drawing
+from icaf4_policy.backbone.classical import Features, described
 from icaf4_policy.checkpoint import description_path
 from icaf4_policy.detector.config import DetectorTrainingConfig
 from icaf4_policy.inference import Perception, Prediction
@@ -61,7 +62,8 @@ def train(
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     device = _usable(device)
-    run_training(config, *_training_samples(data, config.category), out, log=log, device=device)
+    samples = _training_samples(data, config.category, config.features)
+    run_training(config, *samples, out, log=log, device=device)
     print(f"wrote {out} and {description_path(out)}")
     return 0
 
@@ -79,15 +81,26 @@ def _usable(device: str) -> str:
     return device
 
 
-def _training_samples(data: Path, categories: Sequence[str]) -> tuple[Samples, Samples]:
+def _training_samples(
+    data: Path, categories: Sequence[str], features: Features
+) -> tuple[Samples, Samples]:
     """Those to train with, and those of other objects that choose the weights."""
     listed = [c for c in categories if (data / c / "train.txt").is_file()]
     if not listed:
-        return _split(data, categories, "train"), _split(data, categories, "val")
+        training, validation = (
+            _split(data, categories, split, features) for split in ("train", "val")
+        )
+        return training, validation
     if len(categories) > 1:
         raise InvalidArgumentError(
             f"category={', '.join(categories)}: {data / listed[0]} holds the authors' data, which "
             "is trained with one category at a time."
+        )
+    if features != "color":
+        raise InvalidArgumentError(
+            f"features={features!r}: {data / listed[0]} holds the authors' data, which has no "
+            "pictures to describe points by. Train with features 'color', or on what 'artgym "
+            "generate' makes."
         )
     samples = AuthorsFolder(data, listed[0], "train")
     numbers = [sample.urdf_id for sample in samples]
@@ -98,8 +111,15 @@ def _training_samples(data: Path, categories: Sequence[str]) -> tuple[Samples, S
     )
 
 
-def _split(data: Path, categories: Sequence[str], split: str) -> Iterator[Sample]:
-    return chain.from_iterable(SampleFolder(data / category / split) for category in categories)
+def _split(
+    data: Path, categories: Sequence[str], split: str, features: Features
+) -> Iterator[Sample]:
+    folders = [data / category / split for category in categories]
+    if features == "color":
+        # Pictures take far longer to read than samples.
+        return chain.from_iterable(SampleFolder(folder) for folder in folders)
+    pictures = chain.from_iterable(PictureFolder(folder) for folder in folders)
+    return (described(picture, s, features) for picture in pictures for s in picture.samples)
 
 
 def train_detector(

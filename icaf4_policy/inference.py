@@ -15,6 +15,7 @@ from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import anchors_from_config
+from icaf4_policy.backbone.classical import CHANNELS, point_features
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.collisions import CollisionConfig, hand_is_free
@@ -219,12 +220,29 @@ class Perception:
         R_level_camera = level_from_camera(view.up_camera)
         prediction = self.predict(
             view.points_camera,
-            view.colors,
+            self.point_features(view.points_camera, view.colors, rgb, intrinsics),
             R_level_camera,
             table_camera=view.table_camera,
             rng=rng,
         )
         return prediction, view
+
+    def point_features(
+        self, points_camera: ArrayLike, colors: ArrayLike, rgb: ArrayLike, intrinsics: ArrayLike
+    ) -> NDArray[np.uint8]:
+        """What ``predict`` is to be given as colours: they themselves, or descriptors.
+
+        Args:
+            points_camera: (M, 3), metres, of the object alone.
+            colors: uint8 (M, 3).
+            rgb: uint8 (H, W, 3), the picture that they are of.
+            intrinsics: (3, 3).
+
+        Returns:
+            uint8 (M, C).
+        """
+        features = self.model.config.features
+        return point_features(points_camera, colors, rgb, intrinsics, features)
 
     @torch.inference_mode()
     def predict(
@@ -240,7 +258,7 @@ class Perception:
 
         Args:
             points_camera: (M, 3), metres, of the object alone.
-            colors: uint8 (M, 3).
+            colors: uint8 (M, 3), or descriptors (M, C) for a network that is given those.
             R_level_camera: (3, 3).
             table_camera: (3,), a point of the table, which the hand keeps out of.
             rng: for the fits and the choice of points.
@@ -294,8 +312,14 @@ class Perception:
                 f"points_camera has shape {points_camera.shape}: expected (M, 3) with M at least "
                 f"{MIN_OBJECT_POINTS}."
             )
-        points_level, _ = level_points(points_camera, R_level_camera)
         config = self.model.config
+        expected = (len(points_camera), CHANNELS[config.features])
+        if colors.shape != expected:
+            raise InvalidArgumentError(
+                f"colors has shape {colors.shape}: expected {expected}, features "
+                f"{config.features!r} of each point."
+            )
+        points_level, _ = level_points(points_camera, R_level_camera)
         pick = choose_points(len(points_camera), config.num_points, rng)
         outputs = self.model(
             torch.from_numpy(points_level[pick][None].astype(np.float32)),

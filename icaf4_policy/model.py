@@ -8,8 +8,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from artgym.errors import InvalidArgumentError
+from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
+from icaf4_policy.backbone.classical import CHANNELS, Features, PointwiseBackbone
 from icaf4_policy.backbone.pointnet2 import BackboneConfig, PointNet2
 from icaf4_policy.heads.affordance import AffordanceHead
 from icaf4_policy.heads.grasp import GraspHead
@@ -30,6 +31,8 @@ class ModelConfig:
         num_points: points of a cloud.
         anchors: what grasps are refined from.
         backbone: sizes of the backbone.
+        features: what is given of each point beside where it is; descriptors go to the heads
+            through a layer of ``backbone.width_out`` features, without PointNet++.
     """
 
     categories: tuple[str, ...]
@@ -38,6 +41,7 @@ class ModelConfig:
     num_points: int = 2048
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
+    features: Features = "color"
 
     def __post_init__(self) -> None:
         if self.num_parts < 1:
@@ -51,6 +55,8 @@ class ModelConfig:
             raise InvalidArgumentError(
                 f"length_units={self.length_units} must be positive, metres."
             )
+        if self.features not in CHANNELS:
+            raise UnknownNameError("features", self.features, CHANNELS)
         if self.num_points < self.backbone.centers[0]:
             raise InvalidArgumentError(
                 f"num_points={self.num_points} must be at least {self.backbone.centers[0]}, the "
@@ -99,7 +105,12 @@ class Icaf4(nn.Module):
         channels = config.backbone.width_out
         # One category needs no telling.
         told = len(config.categories) if len(config.categories) > 1 else 0
-        self.backbone = PointNet2(3 + told, config.backbone)
+        given = CHANNELS[config.features] + told
+        self.backbone: PointNet2 | PointwiseBackbone = (
+            PointNet2(given, config.backbone)
+            if config.features == "color"
+            else PointwiseBackbone(given, channels)
+        )
         self.register_buffer("length_units", torch.tensor(config.length_units), persistent=False)
         self.segmentation = SegmentationHead(channels, config.num_parts)
         self.nocs = NocsHead(channels, config.num_parts)
@@ -119,7 +130,7 @@ class Icaf4(nn.Module):
 
         Args:
             points_level: float32 (B, N, 3), metres, level frame, centred on the cloud.
-            colors: float32 (B, N, 3) in [0, 1].
+            colors: float32 (B, N, C) in [0, 1], C = 3, or that of the descriptors.
             category: int64 (B,), into ``config.categories``.
             grasp_points: the points whose grasps are wanted: int64 (B, S), or how many of the
                 points of highest affordance; all when left out.

@@ -103,9 +103,10 @@ class ScenePerception:
             mask = detection.mask & is_seen & stands_out
             if detection.category not in self.perceptions or mask.sum() < MIN_OBJECT_POINTS:
                 continue
-            prediction = self.perceptions[detection.category].predict(
-                points_camera[mask],
-                rgb[mask],
+            perception, points = self.perceptions[detection.category], points_camera[mask]
+            prediction = perception.predict(
+                points,
+                perception.point_features(points, rgb[mask], rgb, intrinsics),
                 level_from_camera(up_camera),
                 table_camera=table_camera,
                 rng=rng,

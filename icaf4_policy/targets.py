@@ -30,7 +30,7 @@ class Targets:
     Attributes:
         category: index of the object's category.
         points_level: float32 (M, 3), metres, centred.
-        colors: uint8 (M, 3).
+        colors: uint8 (M, 3), or descriptors (M, C).
         part: uint8 (M,).
         npcs: float16 (M, 3) and naocs: float16 (M, 3).
         affordance: uint8 (M,), codes of ``Sample.affordance``.
@@ -145,7 +145,8 @@ class Batch:
     """B clouds of N points with their targets; S points a cloud carry grasp targets.
 
     Attributes:
-        points_level: float32 (B, N, 3), metres, and colors: float32 (B, N, 3) in [0, 1].
+        points_level: float32 (B, N, 3), metres, and colors: float32 (B, N, 3) in [0, 1], or
+            descriptors (B, N, C).
         category: int64 (B,).
         part: int64 (B, N).
         npcs: float32 (B, N, 3) and naocs: float32 (B, N, 3).

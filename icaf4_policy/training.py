@@ -15,9 +15,10 @@ from tqdm import tqdm
 
 from artgym.datasets.authors import AuthorsSample
 from artgym.datasets.sample import Sample
-from artgym.errors import InvalidArgumentError
+from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.authors_targets import targets_from_authors
+from icaf4_policy.backbone.classical import CHANNELS, Features
 from icaf4_policy.dataset import SPARE_POINTS
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig
@@ -52,9 +53,11 @@ class TrainingConfig:
         num_points: points of a cloud.
         num_grasp_points: points of a cloud whose grasps are learnt in a step.
         anchors: what grasps are refined from.
+        features: what is given of each point beside where it is: its colour, or a descriptor of
+            the paper's baselines, which takes the place of PointNet++.
         precision: of the products while training; "bfloat16" is a quarter faster where the
             processor has it, and predictions and coordinates stay in float32 all the same.
-        color_jitter: spread of the random change of colours.
+        color_jitter: spread of the random change of colours; descriptors are left as they are.
         validate_every: epochs between validations; the last epoch is always validated.
         seed: of the weights, the order of samples and the choice of points.
         losses: weight of each loss.
@@ -73,6 +76,7 @@ class TrainingConfig:
     num_points: int = 2048
     num_grasp_points: int = 384
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
+    features: Features = "color"
     precision: Literal["float32", "bfloat16"] = "bfloat16"
     color_jitter: float = 0.2
     validate_every: int = 2
@@ -99,6 +103,8 @@ class TrainingConfig:
                 raise InvalidArgumentError(
                     f"{name}={getattr(self, name)} must be positive and finite."
                 )
+        if self.features not in CHANNELS:
+            raise UnknownNameError("features", self.features, CHANNELS)
         if self.num_grasp_points > self.num_points:
             raise InvalidArgumentError(
                 f"num_grasp_points={self.num_grasp_points} exceeds num_points={self.num_points}."
@@ -113,13 +119,13 @@ def prepare(
     """Targets of all samples, and a digest of what went in.
 
     Args:
-        samples: decoded one at a time if they are lazy; those of the authors do not tell their
-            category, and are of the only one.
+        samples: decoded one at a time if they are lazy, and described if ``config.features`` are
+            descriptors; those of the authors do not tell their category, and are of the only one.
         config: of the training.
         label: what the progress bar says.
 
     Raises:
-        InvalidArgumentError: a sample of another category.
+        InvalidArgumentError: a sample of another category, or with other features.
     """
     anchors = anchors_from_config(config.anchors)
     digest = hashlib.sha256()
@@ -132,6 +138,13 @@ def prepare(
         else:
             name, grasps = sample.object_id, sample.grasp_bits
             prepared.append(targets_from_sample(sample, config.category, anchors, most))
+        channels = prepared[-1].colors.shape[1]
+        if channels != CHANNELS[config.features]:
+            raise InvalidArgumentError(
+                f"{name}: its points have {channels} channels, expected the "
+                f"{CHANNELS[config.features]} of features={config.features!r}. Describe samples "
+                "with icaf4_policy.backbone.classical.described."
+            )
         digest.update(name.encode())
         digest.update(np.ascontiguousarray(sample.points_camera).tobytes())
         digest.update(np.ascontiguousarray(grasps).tobytes())
@@ -151,6 +164,7 @@ def _model_config(config: TrainingConfig, targets: Sequence[Targets]) -> ModelCo
         length_units=tuple(units),
         num_points=config.num_points,
         anchors=config.anchors,
+        features=config.features,
     )
 
 
@@ -255,7 +269,8 @@ def train(
         num_anchors=model.grasp.shape[0],
         num_grasp_points=config.num_grasp_points,
     )
-    draw = replace(draw_plain, color_jitter=config.color_jitter)
+    jitter = config.color_jitter if config.features == "color" else 0.0
+    draw = replace(draw_plain, color_jitter=jitter)
     run.complete(
         weights,
         epochs=config.epochs,
