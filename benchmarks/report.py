@@ -7,6 +7,7 @@ between them is written here from the JSON files of ``benchmarks/results`` and n
 from __future__ import annotations
 
 import json
+import statistics
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -34,20 +35,18 @@ def _rate(row: Mapping[str, Any]) -> str:
 
 
 def success_rate_block(result: Mapping[str, Any]) -> str:
-    """A Markdown table of ``success_rate.json``, policies by categories."""
-    categories = list(result["rows"])
-    head = "".join(f" {c}: success | gripped | travel |" for c in categories)
-    lines = [f"| policy |{head}", "|---|" + "---|" * (3 * len(categories))]
-    for policy in result["config"]["policy"]:
-        cells = [policy]
-        for category in categories:
-            row = result["rows"][category][policy]
-            cells += [
-                _rate(row),
-                f"{100 * row['success_gripped']:.0f} %",
-                f"{100 * row['travel']:.0f} %",
-            ]
-        lines.append("| " + " | ".join(cells) + " |")
+    """A Markdown table of ``success_rate.json``, categories by policies."""
+    policies = result["config"]["policy"]
+    lines = ["| success, gripped | " + " | ".join(policies) + " |", "|---|" + "---|" * len(policies)]
+    for category, rows in result["rows"].items():
+        cells = [f"{_rate(rows[p])}, {100 * rows[p]['success_gripped']:.0f} %" for p in policies]
+        lines.append(f"| {category} | " + " | ".join(cells) + " |")
+    means = [
+        [100 * statistics.fmean(row[p][key] for row in result["rows"].values()) for p in policies]
+        for key in ("success", "success_gripped")
+    ]
+    cells = [f"{success:.0f} %, {gripped:.0f} %" for success, gripped in zip(*means, strict=True)]
+    lines.append("| mean | " + " | ".join(cells) + " |")
     config = result["config"]
     count = config["objects"] * config["episodes"]
     lines += [
@@ -366,10 +365,27 @@ def rl_baselines_block(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def real_frame_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``real_frame.json``, a way to find the object a line."""
+    lines = [
+        "| the object's points from | base: rotation, deg | mm | lid: rotation, deg | mm |",
+        "|---|---|---|---|---|",
+    ]
+    rows = (("the detector", "by_detector"), ("all that stands on the table", "by_table_plane"))
+    for label, name in rows:
+        cells = [label]
+        for part in (result[name] or {"parts": (None, None)})["parts"]:
+            cells.append("not found" if part is None else f"{part['rotation_deg']:.1f}")
+            cells.append("" if part is None else f"{1000 * part['translation_m']:.0f}")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "success_rate": success_rate_block,
     "object_table": object_table_block,
     "scene_table": scene_table_block,
+    "real_frame": real_frame_block,
     "objects": objects_block,
     "variety": variety_block,
     "solvability": solvability_block,
@@ -383,7 +399,13 @@ BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
 
 
 #: What makes a result whose module has several.
-_COMMANDS = {"env_speed": "speed env", "label_speed": "speed labels", "pose_speed": "speed poses"}
+_COMMANDS = {
+    "env_speed": "speed env",
+    "label_speed": "speed labels",
+    "pose_speed": "speed poses",
+    "object_table": "perception table1",
+    "scene_table": "perception table3",
+}
 
 
 def filled(page: str, results: Path = RESULTS_FOLDER) -> str:

@@ -48,7 +48,7 @@ class SuccessRateConfig:
     policy: tuple[str, ...] = tuple(POLICIES)
     category: tuple[str, ...] = field(default_factory=trained_categories)
     split: catalog.Split = "test"
-    objects: int = 40
+    objects: int = 20
     episodes: int = 1
     seed: int = 0
     workers: int = 2

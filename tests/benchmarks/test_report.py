@@ -21,6 +21,6 @@ def test_block_without_end_is_refused():
 
 
 def test_missing_result_is_named(tmp_path):
-    page = "<!-- perception -->\n<!-- /perception -->"
-    with pytest.raises(DamagedFileError, match=r"perception\.json"):
+    page = "<!-- object_table -->\n<!-- /object_table -->"
+    with pytest.raises(DamagedFileError, match=r"object_table\.json"):
         report.filled(page, tmp_path)
