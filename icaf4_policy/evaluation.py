@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from artgym.datasets.sample import (
 )
 from artgym.geometry.transforms import invert, translation
 from icaf4_policy import metrics
-from icaf4_policy.inference import MIN_PART_POINTS, Perception, Prediction
+from icaf4_policy.inference import MIN_PART_POINTS, Perception, PointGrasps, Prediction
 from icaf4_policy.pose_fitting import PoseFit
 
 Array = NDArray[np.floating]
@@ -62,16 +62,49 @@ def evaluate_sample(
         prediction = refit(prediction)
     row = _part_metrics(prediction, sample) | _joint_metrics(prediction, sample)
 
-    truth = sample.affordance[prediction.point_index]
-    known = truth != AFFORDANCE_UNKNOWN
-    called = prediction.affordance > 0.5
-    ious = metrics.class_ious(called[known], truth[known] == AFFORDANCE_YES, 2)
-    row["affordance_iou"] = float(ious[1])
-    row["affordance_miou"] = float(np.nanmean(ious)) if known.any() else float("nan")
+    row |= _affordance_metrics(prediction, sample)
     row["label_density"], row["label_density_graspable"] = metrics.label_density(
         sample.successful_tries()
     )
-    return row | _grasp_metrics(perception, sample, rng, top), prediction
+    points = perception.point_grasps(*seen, top=top, rng=rng)
+    return row | _grasp_metrics(points, sample, rng, top, metrics.CHANCE_ROWS), prediction
+
+
+def evaluate_grasps(
+    perception: Perception,
+    sample: Sample,
+    rng: np.random.Generator,
+    *,
+    top: int = 10,
+    chance: bool = True,
+) -> dict[str, float]:
+    """The metrics of affordance and grasps of one view alone, as ``evaluate_sample`` has them.
+
+    Networks that differ in their grasp heads alone are asked at the same points for the same
+    ``rng``, and stand beside the same chance rows.
+
+    Args:
+        perception: the network.
+        sample: a labelled view.
+        rng: for the choice of points and the chance rows.
+        top: J, proposals a point that coverage counts.
+        chance: whether the chance rows are measured.
+    """
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    points = perception.point_grasps(*seen, top=top, rng=rng)
+    sources = metrics.CHANCE_ROWS if chance else {}
+    return _affordance_metrics(points, sample) | _grasp_metrics(points, sample, rng, top, sources)
+
+
+def _affordance_metrics(seen: Prediction | PointGrasps, sample: Sample) -> dict[str, float]:
+    truth = sample.affordance[seen.point_index]
+    known = truth != AFFORDANCE_UNKNOWN
+    called = seen.affordance > 0.5
+    ious = metrics.class_ious(called[known], truth[known] == AFFORDANCE_YES, 2)
+    return {
+        "affordance_iou": float(ious[1]),
+        "affordance_miou": float(np.nanmean(ious)) if known.any() else float("nan"),
+    }
 
 
 def _part_metrics(prediction: Prediction, sample: Sample) -> dict[str, float]:
@@ -141,11 +174,12 @@ def _joint_metrics(prediction: Prediction, sample: Sample) -> dict[str, float]:
 
 
 def _grasp_metrics(
-    perception: Perception, sample: Sample, rng: np.random.Generator, top: int
+    points: PointGrasps,
+    sample: Sample,
+    rng: np.random.Generator,
+    top: int,
+    chance_rows: Mapping[str, metrics.ChanceRow],
 ) -> dict[str, float]:
-    points = perception.point_grasps(
-        sample.points_camera, sample.colors, sample.R_level_camera, top=top, rng=rng
-    )
     label = sample.grasp_row[points.point_index]
     tries = sample.successful_tries()
     graspable = (label >= 0) & np.any(tries, axis=1)[label]
@@ -158,7 +192,7 @@ def _grasp_metrics(
     normals_object = -R_object_tries[:, 0, :, 2]
     R_object_camera = sample.T_camera_object[:3, :3].astype(float).T
     proposals = {"network": R_object_camera @ points.R_camera_grasp[judged]}
-    for name, propose in metrics.CHANCE_ROWS.items():
+    for name, propose in chance_rows.items():
         proposals[name] = propose(normals_object, top, rng)
     called = points.affordance[judged] > 0.5
     # A call at a point that offers nothing is a miss at any angle; where no label lies near,

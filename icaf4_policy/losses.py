@@ -11,7 +11,7 @@ from torch.nn import functional as F
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, JOINT_NONE, JOINT_REVOLUTE
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.model import Outputs
-from icaf4_policy.targets import Batch
+from icaf4_policy.targets import Batch, GraspTargets
 
 #: Below this error, in NOCS and in network units, the smooth L1 losses are quadratic.
 _SMOOTH = 0.05
@@ -65,10 +65,7 @@ def loss_terms(outputs: Outputs, batch: Batch, units: Tensor | float) -> dict[st
     offset_error = F.smooth_l1_loss(
         outputs.joint_offset, batch.joint_offset / units, beta=_SMOOTH, reduction="none"
     ).sum(dim=-1)
-    anchor_error = F.binary_cross_entropy_with_logits(
-        outputs.anchors, batch.anchor_mask, reduction="none"
-    ).mean(dim=-1)
-    matched = outputs.residuals.flatten(0, 2)[batch.match_index]  # (n, 4)
+    matched = outputs.residuals.flatten(0, 2)[batch.match_index]  # (n, r)
     known = batch.affordance != AFFORDANCE_UNKNOWN
     affordance_error = F.cross_entropy(
         outputs.affordance.transpose(1, 2),
@@ -84,8 +81,24 @@ def loss_terms(outputs: Outputs, batch: Batch, units: Tensor | float) -> dict[st
         "joint_type": F.cross_entropy(outputs.joint_type.transpose(1, 2), batch.joint_type),
         "joint_axis": _masked_mean(axis_error, movable),
         "joint_offset": _masked_mean(offset_error, revolute),
-        "anchors": _masked_mean(anchor_error, batch.grasp_weight),
-        "residuals": (matched - batch.match_residual).square().sum() / max(len(matched), 1),
+        **grasp_terms(outputs.anchors, matched, batch),
+    }
+
+
+def grasp_terms(logits: Tensor, matched: Tensor, truth: GraspTargets) -> dict[str, Tensor]:
+    """The two losses of a grasp head, unweighted: "anchors" and "residuals" (Eqs. 2 to 4).
+
+    Args:
+        logits: of the anchors, (B, S, L).
+        matched: residuals (n, r) at ``truth.match_index``.
+        truth: of the same points.
+    """
+    anchor_error = F.binary_cross_entropy_with_logits(
+        logits, truth.anchor_mask, reduction="none"
+    ).mean(dim=-1)
+    return {
+        "anchors": _masked_mean(anchor_error, truth.grasp_weight),
+        "residuals": (matched - truth.match_residual).square().sum() / max(len(matched), 1),
     }
 
 

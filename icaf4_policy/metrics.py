@@ -113,8 +113,11 @@ def hemisphere(normals: ArrayLike, count: int, rng: np.random.Generator) -> Arra
     )
 
 
+#: Proposals (n, count, 3, 3) from normals (n, 3), count and generator, see ``normal_on_grid``.
+ChanceRow = Callable[[ArrayLike, int, np.random.Generator], Array]
+
 #: Rows to print beside every grasp metric.
-CHANCE_ROWS: dict[str, Callable[[ArrayLike, int, np.random.Generator], Array]] = {
+CHANCE_ROWS: dict[str, ChanceRow] = {
     "normal_grid_roll": normal_on_grid,
     "normal_random_roll": normal_any_roll,
     "random_hemisphere": hemisphere,

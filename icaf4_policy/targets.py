@@ -81,6 +81,30 @@ def _mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDAr
     return angles
 
 
+def grasp_matches(
+    sample: Sample, anchors: Anchors
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.floating]]:
+    """The matched anchors of every labelled point, one residual each (Eqs. 2 to 4).
+
+    Of the grasps of one point that share an anchor, the nearest to it gives the residual; where
+    one must speak for all ("direct"), it is the most central.
+
+    Returns:
+        The labelled point of each match (n,), ascending; its anchor (n,); its residual (n, r).
+    """
+    row, R_level_grasp = successful_grasps(sample)
+    matched, residual = anchors.match(R_level_grasp)
+    if anchors.kind == "direct":
+        rank = _mean_angles(row, R_level_grasp)
+    else:
+        rank = np.sum(residual**2, axis=-1)
+    order = np.lexsort((rank, matched, row))
+    row, matched, residual = row[order], matched[order], residual[order]
+    first = np.ones(len(row), dtype=bool)
+    first[1:] = (np.diff(row) != 0) | (np.diff(matched) != 0)
+    return row[first], matched[first], residual[first]
+
+
 def targets_from_sample(
     sample: Sample, categories: Sequence[str], anchors: Anchors, max_points: int
 ) -> Targets:
@@ -106,20 +130,7 @@ def targets_from_sample(
     keep = np.linspace(0, total - 1, min(total, max_points)).round().astype(int)
     R_level_camera = sample.R_level_camera.astype(float)
 
-    row, R_level_grasp = successful_grasps(sample)
-    matched, residual = anchors.match(R_level_grasp)
-    # Of the grasps of one point that share an anchor, the nearest to it gives the residual; where
-    # one must speak for all, it is the most central.
-    if anchors.kind == "direct":
-        rank = _mean_angles(row, R_level_grasp)
-    else:
-        rank = np.sum(residual**2, axis=-1)
-    order = np.lexsort((rank, matched, row))
-    row, matched, residual = row[order], matched[order], residual[order]
-    first = np.ones(len(row), dtype=bool)
-    first[1:] = (np.diff(row) != 0) | (np.diff(matched) != 0)
-    row, matched, residual = row[first], matched[first], residual[first]
-
+    row, matched, residual = grasp_matches(sample, anchors)
     return Targets(
         category=list(categories).index(category),
         points_level=points_level[keep].astype(np.float32),
@@ -141,7 +152,25 @@ def targets_from_sample(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Batch:
+class GraspTargets:
+    """What a grasp head should say at S points of each of B clouds.
+
+    Attributes:
+        grasp_weight: float32 (B, S): 1 at points with successful grasps, less at points known to
+            have none, 0 at fillers.
+        anchor_mask: float32 (B, S, L), the multi-hot mask of Eq. 3.
+        match_index: int64 (n,), where the mask is one, counted through (B, S, L).
+        match_residual: float32 (n, r), the residuals there.
+    """
+
+    grasp_weight: Tensor
+    anchor_mask: Tensor
+    match_index: Tensor
+    match_residual: Tensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch(GraspTargets):
     """B clouds of N points with their targets; S points a cloud carry grasp targets.
 
     Attributes:
@@ -155,11 +184,6 @@ class Batch:
         joint_axis: float32 (B, N, 3), level frame, zeros without a joint.
         joint_offset: float32 (B, N, 3), metres, point to nearest axis point, zeros unless revolute.
         grasp_points: int64 (B, S).
-        grasp_weight: float32 (B, S): 1 at points with successful grasps, less at points known to
-            have none, 0 at fillers.
-        anchor_mask: float32 (B, S, L), the multi-hot mask of Eq. 3.
-        match_index: int64 (n,), where the mask is one, counted through (B, S, L).
-        match_residual: float32 (n, r), the residuals there.
     """
 
     points_level: Tensor
@@ -173,10 +197,6 @@ class Batch:
     joint_axis: Tensor
     joint_offset: Tensor
     grasp_points: Tensor
-    grasp_weight: Tensor
-    anchor_mask: Tensor
-    match_index: Tensor
-    match_residual: Tensor
 
     def to(self, device: torch.device) -> Batch:
         """The same on a device."""
@@ -268,21 +288,30 @@ def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) ->
     }
 
 
-def collate_items(items: Sequence[Item], config: DrawConfig) -> Batch:
-    """A batch of drawn items."""
+#: What of an item is about its grasps: the fields of ``GraspTargets`` without ``anchor_mask``.
+GRASP_FIELDS = ("grasp_weight", "match_index", "match_residual")
+
+
+def collate_grasps(items: Sequence[Item], config: DrawConfig) -> GraspTargets:
+    """The grasps' targets of drawn items, of which only ``GRASP_FIELDS`` are read."""
     cells = config.num_grasp_points * config.num_anchors
     index = np.concatenate([item["match_index"] + b * cells for b, item in enumerate(items)])
     residual = np.concatenate([item["match_residual"] for item in items])
     mask = np.zeros((len(items), config.num_grasp_points, config.num_anchors), np.float32)
     mask.reshape(-1)[index] = 1.0
-    stacked = {
-        name: torch.from_numpy(np.stack([item[name] for item in items]))
-        for name in items[0]
-        if name not in ("match_index", "match_residual")
-    }
-    return Batch(
-        **stacked,
+    return GraspTargets(
+        grasp_weight=torch.from_numpy(np.stack([item["grasp_weight"] for item in items])),
         anchor_mask=torch.from_numpy(mask),
         match_index=torch.from_numpy(index),
         match_residual=torch.from_numpy(residual),
     )
+
+
+def collate_items(items: Sequence[Item], config: DrawConfig) -> Batch:
+    """A batch of drawn items."""
+    stacked = {
+        name: torch.from_numpy(np.stack([item[name] for item in items]))
+        for name in items[0]
+        if name not in GRASP_FIELDS
+    }
+    return Batch(**stacked, **vars(collate_grasps(items, config)))

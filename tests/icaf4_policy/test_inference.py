@@ -11,7 +11,7 @@ from artgym.geometry.rotations import grasp_angle, matrix_from_axis_angle
 from icaf4_policy import cli
 from icaf4_policy.checkpoint import save_model
 from icaf4_policy.drawing import read_rgb
-from icaf4_policy.evaluation import evaluate_sample
+from icaf4_policy.evaluation import evaluate_grasps, evaluate_sample
 from icaf4_policy.inference import Perception, ProposalConfig, _joint_from_votes, diverse
 from icaf4_policy.joint_consistency import consistent_fits
 from icaf4_policy.tabletop import fit_table, segment_object
@@ -206,6 +206,16 @@ def test_evaluation_gives_every_metric(perception, sample):
         calls, right = (row[f"{name}/{source}/precision@20"] for name in ("grasp_calls", "grasp"))
         assert 0 <= calls <= right <= 1
     assert 0 < row["label_density"] <= row["label_density_graspable"] <= 1
+
+
+def test_grasps_can_be_evaluated_alone(perception, sample):
+    every, _ = evaluate_sample(perception, sample, rng())
+    alone = evaluate_grasps(perception, sample, rng())
+    assert set(alone) == {n for n in every if n.startswith(("grasp", "affordance"))}
+    # A network's own metrics do not depend on whether chance stands beside them.
+    bare = evaluate_grasps(perception, sample, rng(), chance=False)
+    own = {n: v for n, v in alone.items() if n.count("/") < 2 or "/network/" in n}
+    np.testing.assert_equal(bare, own)
 
 
 def test_predict_command(perception, picture, tmp_path, capsys):

@@ -42,6 +42,16 @@ def tensors(record):
     return {f.name: getattr(record, f.name) for f in dataclasses.fields(record)}
 
 
+@pytest.mark.parametrize("training", [False, True])
+def test_residuals_at_matches_are_those_of_all(network, training):
+    batch, head = toy_batch(), network.grasp.train(training)
+    features = torch.rand(2, 48, SMALL.backbone.width_out)
+    logits, residuals = head(features)
+    at_matches = head.at_matches(features, batch.match_index)
+    torch.testing.assert_close(at_matches[0], logits)
+    torch.testing.assert_close(at_matches[1], residuals.flatten(0, 2)[batch.match_index])
+
+
 def test_shapes(network):
     batch = toy_batch()
     outputs = network(batch.points_level, batch.colors, batch.category, batch.grasp_points)
