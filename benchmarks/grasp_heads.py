@@ -1,0 +1,366 @@
+"""Grasp heads with different anchors, trained side by side on the features of one network.
+
+The backbone and the other heads stay as they are: what a head scores can then only come from its
+anchors, and the points that its network sees, finds graspable and is asked at are those of every
+other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, replace
+from itertools import accumulate
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from artgym.datasets.sample import Sample
+from artgym.errors import DamagedFileError, InvalidArgumentError
+from icaf4_policy.anchors import AnchorConfig, anchors_from_config
+from icaf4_policy.checkpoint import load_model, save_model
+from icaf4_policy.dataset import SPARE_POINTS
+from icaf4_policy.heads.grasp import GraspHead
+from icaf4_policy.losses import LossWeights, grasp_terms, total_loss
+from icaf4_policy.model import Icaf4
+from icaf4_policy.targets import (
+    GRASP_FIELDS,
+    DrawConfig,
+    GraspTargets,
+    Item,
+    Targets,
+    collate_grasps,
+    collate_items,
+    draw_item,
+    grasp_matches,
+    targets_from_sample,
+)
+from icaf4_policy.training_run import TrainingRun, cosine_rate, keep_freed_memory
+
+#: The anchors that ``LossWeights.anchors`` is meant for: as the loss is a mean over anchors, of
+#: which hardly more match where there are many, the weight grows with their number.
+_WEIGHED_FOR = len(anchors_from_config(AnchorConfig(kind="axis", step_deg=45)))
+
+#: Of a residual of any kind.
+_MOST_NUMBERS = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadTrainingConfig:
+    """How grasp heads are trained on frozen features.
+
+    Attributes:
+        samples: views that are learnt from, each with at least one successful grasp.
+        draws: choices of points and colours of a view, whose features are worked out once; epochs
+            take them in turn.
+        epochs: passes over the samples.
+        batch_size: clouds a step.
+        num_grasp_points: S, points of a cloud whose grasps are learnt.
+        learning_rate: of Adam, at its highest; see ``cosine_rate``.
+        weight_decay: of Adam.
+        warmup_share: share of the steps that rise, in [0, 1).
+        gradient_limit: the norm that each head's gradients are clipped to.
+        color_jitter: spread of the random change of colours.
+        seed: of the heads' first weights, the samples, their order and the choice of points.
+        losses: weights of the two losses; that of the anchors holds for 72 of them, and grows with
+            their number.
+    """
+
+    samples: int = 800
+    draws: int = 2
+    epochs: int = 10
+    batch_size: int = 8
+    num_grasp_points: int = 64
+    learning_rate: float = 1e-3
+    weight_decay: float = 1e-4
+    warmup_share: float = 0.03
+    gradient_limit: float = 10.0
+    color_jitter: float = 0.2
+    seed: int = 0
+    losses: LossWeights = field(default_factory=LossWeights)
+
+    def __post_init__(self) -> None:
+        for name in ("samples", "draws", "epochs", "batch_size", "num_grasp_points"):
+            if getattr(self, name) < 1:
+                raise InvalidArgumentError(f"{name}={getattr(self, name)} must be at least 1.")
+        for name in ("learning_rate", "gradient_limit"):
+            if not 0 < getattr(self, name) < float("inf"):
+                raise InvalidArgumentError(
+                    f"{name}={getattr(self, name)} must be positive and finite."
+                )
+        if not 0 <= self.warmup_share < 1:
+            raise InvalidArgumentError(f"warmup_share={self.warmup_share} must be in [0, 1).")
+
+
+def head_path(folder: Path, name: str, category: str) -> Path:
+    """Where the network with the head ``name`` is kept: ``{folder}/{name}/{category}``."""
+    return folder / name / f"{category}.safetensors"
+
+
+def train_heads(
+    model: Icaf4,
+    samples: Sequence[Sample],
+    anchors: Mapping[str, AnchorConfig],
+    folder: Path,
+    config: HeadTrainingConfig,
+    *,
+    samples_sha256: str,
+) -> list[Path]:
+    """Trains a fresh grasp head a name, and writes each as the whole network it belongs to.
+
+    All heads take the same steps on the same features; a head does not depend on which others are
+    trained beside it. Files that an earlier call with the same network, samples and config left
+    are kept, others replaced.
+
+    Args:
+        model: a trained network of one category that is given colours; not changed.
+        samples: training views, read lazily and in a random order.
+        anchors: what each head refines grasps from, by name.
+        folder: where the networks are written, see ``head_path``.
+        config: how to train.
+        samples_sha256: tells these samples from others.
+
+    Returns:
+        The paths of the networks, in the order of ``anchors``.
+
+    Raises:
+        InvalidArgumentError: a network of several categories or one without colours; samples of
+            another category, or none with a successful grasp; no names; more grasp points than
+            points; a loss that is not finite.
+    """
+    category = _only_category(model)
+    if not anchors:
+        raise InvalidArgumentError("anchors is empty: expected one head or more.")
+    if config.num_grasp_points > model.config.num_points:
+        raise InvalidArgumentError(
+            f"num_grasp_points={config.num_grasp_points} exceeds the network's "
+            f"num_points={model.config.num_points}."
+        )
+    facts = {"network_sha256": _state_sha256(model), "samples_sha256": samples_sha256}
+    heads = [_Head(name, kind, model, config, facts) for name, kind in anchors.items()]
+    paths = [head_path(folder, head.name, category) for head in heads]
+    missing = [
+        (head, path)
+        for head, path in zip(heads, paths, strict=True)
+        if not _is_kept(path, head.run.fingerprint)
+    ]
+    if not missing:
+        return paths
+    count = _learn(model, samples, [head for head, _ in missing], config)
+    shared = {**facts, "config": asdict(config), "training_samples": count}
+    for head, path in missing:
+        own = {"fingerprint": head.run.fingerprint, "loss": head.losses}
+        save_model(path, head.network(model), shared | own)
+    return paths
+
+
+def _only_category(model: Icaf4) -> str:
+    if len(model.config.categories) > 1:
+        raise InvalidArgumentError(
+            f"a network for {', '.join(model.config.categories)}: expected one for a single "
+            "category."
+        )
+    if model.config.features != "color":
+        raise InvalidArgumentError(
+            f"a network that is given features={model.config.features!r}: expected one that is "
+            "given colours."
+        )
+    return next(iter(model.config.categories))
+
+
+def _state_sha256(model: Icaf4) -> str:
+    """A digest of all weights."""
+    digest = hashlib.sha256()
+    for name, tensor in sorted(model.state_dict().items()):
+        digest.update(name.encode())
+        digest.update(tensor.contiguous().numpy().tobytes())
+    return digest.hexdigest()
+
+
+def _is_kept(path: Path, fingerprint: str) -> bool:
+    """Whether a network that was trained just so is there, whole."""
+    try:
+        _, description = load_model(path)
+    except DamagedFileError:
+        return False
+    return description["training"].get("fingerprint") == fingerprint
+
+
+class _Head:
+    """One head in training."""
+
+    def __init__(
+        self,
+        name: str,
+        kind: AnchorConfig,
+        model: Icaf4,
+        config: HeadTrainingConfig,
+        facts: Mapping[str, str],
+    ) -> None:
+        self.name, self.kind = name, kind
+        self.anchors = anchors_from_config(kind)
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(config.seed)
+            self.head = GraspHead(
+                model.config.backbone.width_out, len(self.anchors), self.anchors.residual_size
+            )
+        # Direct regression has nothing to choose from.
+        of_anchors = config.losses.anchors * len(self.anchors) / _WEIGHED_FOR
+        self.weights = replace(config.losses, anchors=0.0 if kind.kind == "direct" else of_anchors)
+        adam = torch.optim.Adam(
+            self.head.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+        )
+        settings = [asdict(kind), asdict(config), facts]
+        self.run = TrainingRun(self.head, adam, settings, lambda validation: 0.0)
+        #: Mean loss of each epoch.
+        self.losses: list[float] = []
+
+    def loss(self, features: Tensor, truth: GraspTargets) -> Tensor:
+        """At features (B, S, C)."""
+        logits, residuals = self.head.at_matches(features, truth.match_index)
+        return total_loss(grasp_terms(logits, residuals, truth), self.weights)
+
+    def network(self, model: Icaf4) -> Icaf4:
+        """A copy of the network with this head."""
+        changed = Icaf4(replace(model.config, anchors=self.kind))
+        shared = {k: v for k, v in model.state_dict().items() if not k.startswith("grasp.")}
+        own = {f"grasp.{k}": v for k, v in self.head.state_dict().items()}
+        changed.load_state_dict(deepcopy(shared | own))
+        return changed.eval()
+
+
+def _learn(
+    model: Icaf4, samples: Sequence[Sample], heads: Sequence[_Head], config: HeadTrainingConfig
+) -> int:
+    """Trains the heads, all on the same batches, and says on how many samples."""
+    keep_freed_memory()
+    # The anchors of all heads stand in one row, so that a sample is drawn once for all.
+    starts = [0, *accumulate(len(head.anchors) for head in heads)]
+    draw = DrawConfig(
+        num_points=model.config.num_points,
+        num_anchors=starts[-1],
+        num_grasp_points=config.num_grasp_points,
+        color_jitter=config.color_jitter,
+    )
+    targets = _targets(model, samples, heads, starts, config)
+    drawn = [_drawn(model, targets, draw, config, number) for number in range(config.draws)]
+    batch = min(config.batch_size, len(targets))
+    steps = len(targets) // batch
+    for head in heads:
+        head.head.train()
+    bar = tqdm(range(config.epochs), desc="grasp heads", unit="epoch", leave=False, disable=None)
+    for epoch in bar:
+        features, items = drawn[epoch % config.draws]
+        order = np.random.default_rng((config.seed, 0, epoch)).permutation(len(targets))
+        sums = np.zeros(len(heads))
+        for number in range(steps):
+            # A last, smaller batch would skew the batch statistics.
+            index = order[number * batch : (number + 1) * batch]
+            truth = collate_grasps([items[i] for i in index], draw)
+            seen = features[torch.from_numpy(index)]
+            step, total = epoch * steps + number, config.epochs * steps
+            rate = cosine_rate(config.learning_rate, step, total, config.warmup_share)
+            for h, head in enumerate(heads):
+                loss = head.loss(seen, _part_of(truth, starts[h], head))
+                head.run.learn(loss, rate, config.gradient_limit)
+                sums[h] += loss.item()
+        for head, mean in zip(heads, sums / steps, strict=True):
+            head.losses.append(float(mean))
+    return len(targets)
+
+
+def _targets(
+    model: Icaf4,
+    samples: Sequence[Sample],
+    heads: Sequence[_Head],
+    starts: Sequence[int],
+    config: HeadTrainingConfig,
+) -> list[Targets]:
+    """Targets of samples with successful grasps, the heads' anchors counted on in one row."""
+    kept: list[Targets] = []
+    most = SPARE_POINTS * model.config.num_points
+    order = np.random.default_rng((config.seed, 1)).permutation(len(samples))
+    with tqdm(total=config.samples, desc="targets", unit="view", leave=False, disable=None) as bar:
+        for i in order.tolist():
+            if len(kept) == config.samples:
+                break
+            sample = samples[i]
+            if not sample.successful_tries().any():
+                continue
+            shared = targets_from_sample(sample, model.config.categories, heads[0].anchors, most)
+            kept.append(_with_all_matches(shared, sample, heads, starts))
+            bar.update()
+    if not kept:
+        raise InvalidArgumentError(
+            f"none of {len(samples)} samples has a successful grasp: generate them from labelled "
+            "objects."
+        )
+    return kept
+
+
+def _with_all_matches(
+    shared: Targets, sample: Sample, heads: Sequence[_Head], starts: Sequence[int]
+) -> Targets:
+    """The same targets with the matches of all heads, residuals filled up to four numbers."""
+    rows, matched, residuals = [], [], []
+    # The last of ``starts`` is where one more head's anchors would begin.
+    for head, start in zip(heads, starts, strict=False):
+        row, anchor, residual = grasp_matches(sample, head.anchors)
+        rows.append(row)
+        matched.append(anchor + start)
+        residuals.append(np.pad(residual, ((0, 0), (0, _MOST_NUMBERS - residual.shape[1]))))
+    row = np.concatenate(rows)
+    order = np.argsort(row, kind="stable")
+    counted = np.searchsorted(row[order], np.arange(len(shared.match_start)))
+    return replace(
+        shared,
+        match_start=counted.astype(np.int32),
+        match_anchor=np.concatenate(matched)[order].astype(np.int16),
+        match_residual=np.concatenate(residuals)[order].astype(np.float16),
+    )
+
+
+def _drawn(
+    model: Icaf4,
+    targets: Sequence[Targets],
+    draw: DrawConfig,
+    config: HeadTrainingConfig,
+    number: int,
+) -> tuple[Tensor, list[Item]]:
+    """Features (n, S, C) at the points drawn of every sample, and ``GRASP_FIELDS`` of these."""
+    features: list[Tensor] = []
+    kept: list[Item] = []
+    # What the grasp head is given are the backbone's features at the points that it is asked for.
+    hook = model.grasp.register_forward_pre_hook(lambda _, given: features.append(given[0]))
+    label = f"features, draw {number + 1}/{config.draws}"
+    firsts = range(0, len(targets), config.batch_size)
+    try:
+        for first in tqdm(firsts, desc=label, unit="batch", leave=False, disable=None):
+            items = [
+                draw_item(targets[i], draw, np.random.default_rng((config.seed, 2, number, i)))
+                for i in range(first, min(first + config.batch_size, len(targets)))
+            ]
+            batch = collate_items(items, draw)
+            with torch.no_grad():
+                model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
+            kept += [{name: item[name] for name in GRASP_FIELDS} for item in items]
+    finally:
+        hook.remove()
+    return torch.cat(features), kept
+
+
+def _part_of(truth: GraspTargets, start: int, head: _Head) -> GraspTargets:
+    """Of what all heads should say, what one should."""
+    count, all_heads = len(head.anchors), truth.anchor_mask.shape[-1]
+    row, anchor = truth.match_index // all_heads, truth.match_index % all_heads - start
+    own = (anchor >= 0) & (anchor < count)
+    return GraspTargets(
+        grasp_weight=truth.grasp_weight,
+        anchor_mask=truth.anchor_mask[..., start : start + count],
+        match_index=row[own] * count + anchor[own],
+        match_residual=truth.match_residual[own, : head.anchors.residual_size],
+    )
