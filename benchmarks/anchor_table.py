@@ -1,6 +1,6 @@
 """How many anchors, and which, do grasps need? The paper's Table 2.
 
-Run ``python -m benchmarks.anchor_table --help``.
+Run ``python -m benchmarks.perception table2 --help``.
 
 The paper trains a whole network for each anchor size. Here the networks of a category share all
 but the grasp head: a trained backbone is kept as it is, and fresh heads are trained side by side
@@ -12,7 +12,6 @@ in every row, and a head that could shape the features may do better than any he
 
 from __future__ import annotations
 
-import sys
 import time
 import zlib
 from collections.abc import Mapping, Sequence
@@ -85,7 +84,7 @@ class AnchorTableConfig:
         work: folder for the networks with the trained heads; an interrupted run goes on with what
             is there.
         category: categories of objects; each needs a trained network of its own.
-        rows: anchors to compare, by the names of the table.
+        rows: anchors to compare, by the names of the table; all of them by default.
         weights: folder with {category}.safetensors, instead of the shipped weights.
         samples: training views a category, each with a successful grasp.
         epochs: passes over them.
@@ -246,7 +245,7 @@ def measure(config: AnchorTableConfig) -> dict[str, Any]:
     # Where things lie does not change the numbers.
     places = ("data", "work", "out")
     return {
-        **record.provenance("benchmarks.anchor_table"),
+        **record.provenance("benchmarks.perception"),
         "config": {k: v for k, v in asdict(config).items() if k not in places},
         "training": asdict(training),
         "seconds": {"training": round(trained - began, 1), "views": round(ended - trained, 1)},
@@ -355,7 +354,3 @@ def report(config: AnchorTableConfig) -> list[Table]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the benchmark; see ``benchmarks.command.run``."""
     return run("anchor_table", AnchorTableConfig, report, arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,4 +1,4 @@
-"""The paper's tables, measured here: ``python -m benchmarks.perception table1|table3 --help``."""
+"""The paper's tables, measured here: ``python -m benchmarks.perception table1|table2|table3 --help``."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 
 from artgym.errors import UnknownNameError
-from benchmarks import object_table, scene_table
+from benchmarks import anchor_table, object_table, scene_table
 
 #: What can be printed: the functions take the command line that follows the word.
 TABLES: Mapping[str, Callable[[Sequence[str]], int]] = {
     "table1": object_table.main,
+    "table2": anchor_table.main,
     "table3": scene_table.main,
 }
 

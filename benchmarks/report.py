@@ -37,7 +37,7 @@ def _rate(row: Mapping[str, Any]) -> str:
 def success_rate_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``success_rate.json``, categories by policies."""
     policies = result["config"]["policy"]
-    lines = ["| success, gripped | " + " | ".join(policies) + " |", "|---|" + "---|" * len(policies)]
+    lines = [f"| success, gripped | {' | '.join(policies)} |", "|---|" + "---|" * len(policies)]
     for category, rows in result["rows"].items():
         cells = [f"{_rate(rows[p])}, {100 * rows[p]['success_gripped']:.0f} %" for p in policies]
         lines.append(f"| {category} | " + " | ".join(cells) + " |")
@@ -447,6 +447,7 @@ _COMMANDS = {
     "label_speed": "speed labels",
     "pose_speed": "speed poses",
     "object_table": "perception table1",
+    "anchor_table": "perception table2",
     "scene_table": "perception table3",
 }
 
