@@ -1,4 +1,4 @@
-"""The paper's tables, measured here: ``python -m benchmarks.perception table1|table2|table3 --help``."""
+"""The paper's tables: ``python -m benchmarks.perception table1|table2|table3 --help``."""
 
 from __future__ import annotations
 
