@@ -30,18 +30,18 @@ from icaf4_policy.shipped import trained_categories
 
 #: Columns of the printed tables: metric, heading, decimals.
 _COLUMNS = (
-    ("part_miou", "parts: mIoU", 3),
+    ("part_miou", "part mIoU", 3),
     ("parts_found", "found", 3),
-    ("part_rotation_deg", "rotation, deg", 1),
-    ("part_translation_m", "translation, m", 4),
-    ("part_translation_percent", "% of diameter", 1),
-    ("object_rotation_deg", "object: rotation, deg", 1),
-    ("object_translation_m", "translation, m", 4),
-    ("object_translation_percent", "% of diameter", 1),
-    ("affordance_iou", "affordance: IoU", 3),
+    ("part_rotation_deg", "deg", 1),
+    ("part_translation_m", "m", 4),
+    ("part_translation_percent", "%", 1),
+    ("object_rotation_deg", "object: deg", 1),
+    ("object_translation_m", "m", 4),
+    ("object_translation_percent", "%", 1),
+    ("affordance_iou", "graspable IoU", 3),
     ("affordance_miou", "mIoU", 3),
-    ("grasp/network/error_deg", "grasp: error, deg", 1),
-    (f"grasp/network/coverage@{COVERAGE_DEG}", f"covered at {COVERAGE_DEG} deg", 2),
+    ("grasp/network/error_deg", "grasp deg", 1),
+    (f"grasp/network/coverage@{COVERAGE_DEG}", f"at {COVERAGE_DEG}", 2),
     ("executed", "executed", 2),
 )
 
@@ -206,7 +206,10 @@ def _rounded(row: Mapping[str, float]) -> dict[str, float]:
 
 def category_table(category: str, result: Mapping[str, Any]) -> Table:
     """All methods on one category, the paper's rows beneath ours, chance, and what is promised."""
-    title = f"{category}: unseen objects; paper: ArtImage, other objects"
+    title = (
+        f"{category}, unseen objects; poses in degrees, metres and % of the diameter; grasps: "
+        f"best-match error, covered at {COVERAGE_DEG} deg, executed; paper: ArtImage"
+    )
     table = Table(title=title)
     table.add_column("method")
     for _, heading, _ in _COLUMNS:
