@@ -350,7 +350,7 @@ class Perception:
         type_log = outputs.joint_type[0].log_softmax(dim=-1).numpy()
         axis_camera = outputs.joint_axis[0].numpy() @ R_level_camera
         offset_camera = outputs.joint_offset[0].numpy() @ R_level_camera
-        offset_camera = offset_camera * float(self.model.units_of(self._index))
+        offset_camera = offset_camera * float(outputs.unit)
         for k in range(num_parts):
             on_part = part == k
             if on_part.sum() < MIN_PART_POINTS:

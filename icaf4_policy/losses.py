@@ -51,19 +51,18 @@ def _coordinate_loss(predicted: Tensor, truth: Tensor, part: Tensor) -> Tensor:
     return F.smooth_l1_loss(own, truth, beta=_SMOOTH)
 
 
-def loss_terms(outputs: Outputs, batch: Batch, units: Tensor | float) -> dict[str, Tensor]:
+def loss_terms(outputs: Outputs, batch: Batch) -> dict[str, Tensor]:
     """Every loss, unweighted, by the names of ``LossWeights``.
 
     Args:
         outputs: of the network, at ``batch.grasp_points``.
         batch: the truth.
-        units: metres of one network unit, or (B, 1, 1) of them (``Icaf4.units_of``).
     """
     revolute = batch.joint_type == JOINT_REVOLUTE - JOINT_NONE  # (B, N)
     movable = batch.joint_type > 0
     axis_error = (outputs.joint_axis - batch.joint_axis).square().sum(dim=-1)
     offset_error = F.smooth_l1_loss(
-        outputs.joint_offset, batch.joint_offset / units, beta=_SMOOTH, reduction="none"
+        outputs.joint_offset, batch.joint_offset / outputs.unit, beta=_SMOOTH, reduction="none"
     ).sum(dim=-1)
     matched = outputs.residuals.flatten(0, 2)[batch.match_index]  # (n, r)
     known = batch.affordance != AFFORDANCE_UNKNOWN

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 import torch
 from torch import Tensor, nn
@@ -18,6 +19,12 @@ from icaf4_policy.heads.joint import JointHead
 from icaf4_policy.heads.nocs import NocsHead
 from icaf4_policy.heads.segmentation import SegmentationHead
 
+#: What ``ModelConfig.scale`` may be.
+Scale = Literal["category", "cloud"]
+
+#: Half the size of a cloud, in terms of its points' root mean square distance to their mean.
+_SIZE_OF_SPREAD = 1.5
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModelConfig:
@@ -26,8 +33,9 @@ class ModelConfig:
     Attributes:
         categories: ("laptop",), or several, which the network is told apart by.
         num_parts: K, the base included; the most of any category.
-        length_units: metres of one network unit for each category; half the size of a typical
-            object.
+        length_units: half the size of a typical object of each category, metres.
+        scale: what one network unit is: the "category"'s length unit; or of the "cloud", about
+            half its size, and then how much that is of the category's is given to each point.
         num_points: points of a cloud.
         anchors: what grasps are refined from.
         backbone: sizes of the backbone.
@@ -38,6 +46,7 @@ class ModelConfig:
     categories: tuple[str, ...]
     num_parts: int
     length_units: tuple[float, ...]
+    scale: Scale = "category"
     num_points: int = 2048
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
@@ -55,6 +64,8 @@ class ModelConfig:
             raise InvalidArgumentError(
                 f"length_units={self.length_units} must be positive, metres."
             )
+        if self.scale not in get_args(Scale):
+            raise UnknownNameError("scale", self.scale, get_args(Scale))
         if self.features not in CHANNELS:
             raise UnknownNameError("features", self.features, CHANNELS)
         if self.num_points < self.backbone.centers[0]:
@@ -71,6 +82,7 @@ class Outputs:
     B clouds, N points, K parts, S points asked for grasps, L anchors with residuals of r numbers.
 
     Attributes:
+        unit: (B, 1, 1), metres of one network unit.
         segmentation: logits (B, N, K).
         npcs: (B, N, K, 3) and naocs: (B, N, K, 3), 0.5 at the box's centre.
         affordance: logits (B, N, 2).
@@ -82,6 +94,7 @@ class Outputs:
         residuals: (B, S, L, r), see ``Anchors``.
     """
 
+    unit: Tensor
     segmentation: Tensor
     npcs: Tensor
     naocs: Tensor
@@ -105,7 +118,7 @@ class Icaf4(nn.Module):
         channels = config.backbone.width_out
         # One category needs no telling.
         told = len(config.categories) if len(config.categories) > 1 else 0
-        given = CHANNELS[config.features] + told
+        given = CHANNELS[config.features] + told + (config.scale == "cloud")
         self.backbone: PointNet2 | PointwiseBackbone = (
             PointNet2(given, config.backbone)
             if config.features == "color"
@@ -139,7 +152,12 @@ class Icaf4(nn.Module):
         if len(self.config.categories) > 1:
             told = F.one_hot(category, len(self.config.categories)).to(colors.dtype)  # (B, c)
             given.append(told[:, None].expand(-1, points_level.shape[1], -1))
-        unit = self.units_of(category)
+        unit = self.length_units[category][:, None, None]  # (B, 1, 1)
+        if self.config.scale == "cloud":
+            own = _SIZE_OF_SPREAD * points_level.var(dim=1, correction=0).sum(dim=-1).sqrt()
+            own = own[:, None, None]  # (B, 1, 1)
+            given.append((own / unit).log().expand(-1, points_level.shape[1], -1))
+            unit = own
         # (B, N, C)
         features: Tensor = self.backbone(points_level / unit, torch.cat(given, dim=-1))
         affordance: Tensor = self.affordance(features)
@@ -154,6 +172,7 @@ class Icaf4(nn.Module):
         npcs, naocs = self.nocs(features)
         joint_type, joint_axis, joint_offset = self.joint(features)
         return Outputs(
+            unit=unit,
             segmentation=self.segmentation(features),
             npcs=npcs,
             naocs=naocs,
@@ -165,7 +184,3 @@ class Icaf4(nn.Module):
             anchors=anchors,
             residuals=residuals,
         )
-
-    def units_of(self, category: Tensor) -> Tensor:
-        """Metres of one network unit (B, 1, 1) for each cloud of a batch, by category (B,)."""
-        return self.length_units[category][:, None, None]

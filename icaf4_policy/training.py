@@ -21,7 +21,7 @@ from icaf4_policy.authors_targets import targets_from_authors
 from icaf4_policy.backbone.classical import CHANNELS, Features
 from icaf4_policy.dataset import SPARE_POINTS
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
-from icaf4_policy.model import Icaf4, ModelConfig
+from icaf4_policy.model import Icaf4, ModelConfig, Scale
 from icaf4_policy.targets import (
     Batch,
     DrawConfig,
@@ -53,6 +53,7 @@ class TrainingConfig:
         num_points: points of a cloud.
         num_grasp_points: points of a cloud whose grasps are learnt in a step.
         anchors: what grasps are refined from.
+        scale: what one network unit is, see ``ModelConfig``.
         features: what is given of each point beside where it is: its colour, or a descriptor of
             the paper's baselines, which takes the place of PointNet++.
         precision: of the products while training; "bfloat16" is a quarter faster where the
@@ -77,6 +78,7 @@ class TrainingConfig:
     num_grasp_points: int = 384
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
     features: Features = "color"
+    scale: Scale = "cloud"
     precision: Literal["float32", "bfloat16"] = "bfloat16"
     color_jitter: float = 0.2
     validate_every: int = 2
@@ -165,6 +167,7 @@ def _model_config(config: TrainingConfig, targets: Sequence[Targets]) -> ModelCo
         num_points=config.num_points,
         anchors=config.anchors,
         features=config.features,
+        scale=config.scale,
     )
 
 
@@ -209,7 +212,7 @@ def _validate(
     for drawn in _batches(targets, draw, config.batch_size, seed=config.seed, epoch=None):
         batch = drawn.to(device)
         outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
-        terms = loss_terms(outputs, batch, model.units_of(batch.category))
+        terms = loss_terms(outputs, batch)
         terms["total"] = total_loss(terms, config.losses)
         for name, term in terms.items():
             sums[name] = sums.get(name, 0.0) + float(term) * len(batch.part)
@@ -307,7 +310,7 @@ def _train_epoch(
         batch = drawn.to(device)
         with torch.autocast(device.type, dtype=torch.bfloat16, enabled=low):
             outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
-        terms = loss_terms(outputs, batch, model.units_of(batch.category))
+        terms = loss_terms(outputs, batch)
         loss = total_loss(terms, config.losses)
         step = run.epoch * steps_an_epoch + number
         rate = _learning_rate(config, step, steps_an_epoch)

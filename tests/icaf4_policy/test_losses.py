@@ -41,6 +41,7 @@ def truthful_outputs(batch):
         for name, limit in (("part", 1), ("affordance", 1), ("joint_type", 2))
     }
     return Outputs(
+        unit=torch.full((len(batch.part), 1, 1), UNIT),
         segmentation=sure["part"],
         npcs=batch.npcs[:, :, None].expand(-1, -1, 2, -1),
         naocs=batch.naocs[:, :, None].expand(-1, -1, 2, -1),
@@ -55,7 +56,7 @@ def truthful_outputs(batch):
 
 
 def test_every_loss_is_zero_at_the_truth(batch):
-    terms = loss_terms(truthful_outputs(batch), batch, UNIT)
+    terms = loss_terms(truthful_outputs(batch), batch)
     assert set(terms) == {f.name for f in dataclasses.fields(LossWeights)}
     for name, term in terms.items():
         assert term.item() == pytest.approx(0.0, abs=1e-6), name
@@ -79,14 +80,14 @@ def test_every_loss_is_zero_at_the_truth(batch):
 def test_a_wrong_output_raises_its_own_loss_alone(batch, output, loss):
     truth = truthful_outputs(batch)
     wrong = dataclasses.replace(truth, **{output: 0.3 - getattr(truth, output)})
-    terms = loss_terms(wrong, batch, UNIT)
+    terms = loss_terms(wrong, batch)
     assert terms.pop(loss) > 0.05
     assert all(term < 1e-6 for term in terms.values())
 
 
 def test_unknown_affordance_is_ignored(batch):
     unknown = dataclasses.replace(batch, affordance=torch.full_like(batch.affordance, 255))
-    terms = loss_terms(truthful_outputs(batch), unknown, UNIT)
+    terms = loss_terms(truthful_outputs(batch), unknown)
     assert terms["affordance"] == 0
 
 
@@ -97,7 +98,7 @@ def test_other_parts_channels_and_unmatched_residuals_are_free(batch):
     free = dataclasses.replace(
         truth, npcs=truth.npcs + other, residuals=truth.residuals + unmatched
     )
-    assert total_loss(loss_terms(free, batch, UNIT), LossWeights()) < 1e-5
+    assert total_loss(loss_terms(free, batch), LossWeights()) < 1e-5
 
 
 @pytest.mark.parametrize("kind", ["axis", "so3"])
@@ -158,5 +159,5 @@ def test_a_sample_without_any_success_can_be_trained_on():
     draw = DrawConfig(num_points=256, num_anchors=72, num_grasp_points=48)
     targets = targets_from_sample(hopeless, ["toy"], anchors_from_config(AnchorConfig()), 512)
     batch = collate_items([draw_item(targets, draw, np.random.default_rng(0))], draw)
-    terms = loss_terms(truthful_outputs(batch), batch, UNIT)
+    terms = loss_terms(truthful_outputs(batch), batch)
     assert total_loss(terms, LossWeights()).item() == pytest.approx(0.0, abs=1e-5)

@@ -57,6 +57,7 @@ def test_shapes(network):
     outputs = network(batch.points_level, batch.colors, batch.category, batch.grasp_points)
     shapes = {name: tuple(value.shape) for name, value in tensors(outputs).items()}
     assert shapes == {
+        "unit": (2, 1, 1),
         "segmentation": (2, 256, 2),
         "npcs": (2, 256, 2, 3),
         "naocs": (2, 256, 2, 3),
@@ -79,6 +80,24 @@ def test_residuals_are_those_of_the_anchors(kind, shape):
 
 
 @torch.no_grad()
+def test_a_cloud_is_its_own_measure(network):
+    """Grown alike, it looks alike to the backbone, but for being told how large it is."""
+    batch = toy_batch()
+    torch.manual_seed(0)
+    scaled = Icaf4(dataclasses.replace(SMALL, scale="cloud")).eval()
+    seen = []
+    scaled.backbone.register_forward_pre_hook(lambda _, given: seen.append(given))
+    for factor in (1.0, 3.0):
+        outputs = scaled(factor * batch.points_level, batch.colors, batch.category)
+        spread = batch.points_level - batch.points_level.mean(dim=1, keepdim=True)
+        half_size = spread.norm(dim=-1).amax()
+        assert 0.5 < float(outputs.unit.max() / (factor * half_size)) < 1.5
+    (points, told), (grown, told_grown) = seen
+    torch.testing.assert_close(grown, points)
+    torch.testing.assert_close(told_grown[..., :3], told[..., :3])
+    torch.testing.assert_close(told_grown[..., 3] - told[..., 3], torch.full((2, 256), np.log(3)))
+
+
 def test_order_of_points_does_not_matter(network):
     batch = toy_batch()
     network.eval()
@@ -89,7 +108,7 @@ def test_order_of_points_does_not_matter(network):
         batch.points_level[:, order], batch.colors[:, order], batch.category, everyone
     )
     for name, value in tensors(straight).items():
-        if name != "grasp_points":
+        if name not in ("unit", "grasp_points"):
             torch.testing.assert_close(
                 value[:, order], getattr(shuffled, name), rtol=1e-4, atol=1e-5, msg=name
             )
@@ -111,7 +130,7 @@ def test_training_step_does_not_write_to_its_batch(network):
     batch = toy_batch()
     before = {name: value.clone() for name, value in tensors(batch).items()}
     outputs = network(batch.points_level, batch.colors, batch.category, batch.grasp_points)
-    total_loss(loss_terms(outputs, batch, SMALL.length_units[0]), LossWeights()).backward()
+    total_loss(loss_terms(outputs, batch), LossWeights()).backward()
     for name, value in tensors(batch).items():
         assert torch.equal(value, before[name]), name
 
@@ -119,7 +138,7 @@ def test_training_step_does_not_write_to_its_batch(network):
 def test_every_weight_receives_a_gradient(network):
     batch = toy_batch()
     outputs = network(batch.points_level, batch.colors, batch.category, batch.grasp_points)
-    total_loss(loss_terms(outputs, batch, SMALL.length_units[0]), LossWeights()).backward()
+    total_loss(loss_terms(outputs, batch), LossWeights()).backward()
     for name, weight in network.named_parameters():
         assert weight.grad is not None, name
         assert weight.grad.abs().sum() > 0, name
@@ -131,7 +150,7 @@ def test_overfits_one_sample(network):
     history = []
     for _ in range(150):
         outputs = network(batch.points_level, batch.colors, batch.category, batch.grasp_points)
-        terms = loss_terms(outputs, batch, SMALL.length_units[0])
+        terms = loss_terms(outputs, batch)
         loss = total_loss(terms, LossWeights())
         optimizer.zero_grad()
         loss.backward()
@@ -144,7 +163,12 @@ def test_overfits_one_sample(network):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("num_parts", 0), ("length_units", (0.0,)), ("categories", ()), ("num_points", 32)],
+    [
+        ("num_parts", 0),
+        ("length_units", (0.0,)),
+        ("categories", ()),
+        ("num_points", 32),
+    ],
 )
 def test_impossible_configurations_are_refused(field, value):
     with pytest.raises(InvalidArgumentError, match=re.escape(f"{field}={value}")):
