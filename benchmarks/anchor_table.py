@@ -35,7 +35,7 @@ from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
 from benchmarks.command import run
-from benchmarks.grasp_heads import HeadTrainingConfig, train_heads
+from benchmarks.grasp_heads import HeadKind, HeadTrainingConfig, train_heads
 from benchmarks.paper import TABLE_2
 from benchmarks.parallel import results_in_order
 from benchmarks.policies import load_perception
@@ -60,18 +60,30 @@ _SPACING_GRASPS = 4000
 
 
 @cache
-def anchor_kinds() -> Mapping[str, AnchorConfig]:
+def head_kinds() -> Mapping[str, HeadKind]:
     """The rows, by name.
 
-    "direct" regression; "axis_10" to "axis_45", the paper's anchors every so many degrees; and
-    beside each as many so3 anchors, named by their number: "so3_1836" to "so3_72".
+    "direct" regression; "axis_10" to "axis_45", the paper's anchors every so many degrees; beside
+    each as many so3 anchors, named by their number: "so3_1836" to "so3_72"; and of "axis_45"
+    what becomes of it with each thing that the released code does otherwise, and with all.
     """
     axis = {step: AnchorConfig(kind="axis", step_deg=step) for step in ANCHOR_STEPS_DEG}
     counts = [len(axis_anchors(step)) for step in ANCHOR_STEPS_DEG]
-    return {
+    anchors = {
         "direct": AnchorConfig(kind="direct"),
         **{f"axis_{step}": kind for step, kind in axis.items()},
         **{f"so3_{count}": AnchorConfig(kind="so3", count=count) for count in counts},
+    }
+    coarse = axis[ANCHOR_STEPS_DEG[-1]]
+    return {
+        **{name: HeadKind(anchors=kind) for name, kind in anchors.items()},
+        "sign_blind": HeadKind(anchors=coarse, sign_blind=True),
+        "one_pose": HeadKind(anchors=coarse, one_pose=True),
+        "softmax": HeadKind(anchors=coarse, one_pose=True, softmax=True),
+        "all_residuals": HeadKind(anchors=coarse, one_pose=True, all_residuals=True),
+        "released": HeadKind(
+            anchors=coarse, sign_blind=True, one_pose=True, softmax=True, all_residuals=True
+        ),
     }
 
 
@@ -120,13 +132,13 @@ class AnchorTableConfig:
         for category in self.category:
             catalog.category(category)
         for row in self.rows:
-            if row not in anchor_kinds():
-                raise UnknownNameError("row", row, anchor_kinds())
+            if row not in head_kinds():
+                raise UnknownNameError("row", row, head_kinds())
 
     @property
-    def kinds(self) -> Mapping[str, AnchorConfig]:
-        """The anchors to compare, by name."""
-        return {name: anchor_kinds()[name] for name in self.rows or anchor_kinds()}
+    def kinds(self) -> Mapping[str, HeadKind]:
+        """The heads to compare, by name."""
+        return {name: head_kinds()[name] for name in self.rows or head_kinds()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,7 +253,7 @@ def measure(config: AnchorTableConfig) -> dict[str, Any]:
             **category_result(views),
             "paper": TABLE_2.get(category, {}),
         }
-    kinds = {name: kind for name, kind in config.kinds.items() if kind.kind != "direct"}
+    kinds = {k: v.anchors for k, v in config.kinds.items() if v.anchors.kind != "direct"}
     # Where things lie does not change the numbers.
     places = ("data", "work", "out")
     return {

@@ -18,7 +18,7 @@ from artgym.datasets.picture_files import PictureFolder, SampleFolder
 from artgym.datasets.sample import Sample
 from artgym.errors import InvalidArgumentError
 from artgym.files import MANIFEST_NAME, file_sha256
-from benchmarks.grasp_heads import HeadTrainingConfig, train_heads
+from benchmarks.grasp_heads import HeadKind, HeadTrainingConfig, train_heads
 from benchmarks.policies import load_perception
 from icaf4_policy.anchors import AnchorConfig
 from icaf4_policy.backbone.classical import Features, described
@@ -93,7 +93,7 @@ def train_baselines(
     train_heads(
         icaf4,
         folder,
-        {DIRECT: AnchorConfig(kind="direct")},
+        {DIRECT: HeadKind(anchors=AnchorConfig(kind="direct"))},
         work,
         config.heads,
         samples_sha256=file_sha256(folder.folder / MANIFEST_NAME),

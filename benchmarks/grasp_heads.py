@@ -16,11 +16,14 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn import functional as F
 from tqdm import tqdm
 
 from artgym.datasets.sample import Sample
 from artgym.errors import DamagedFileError, InvalidArgumentError
+from artgym.geometry.rotations import quaternion_from_matrix
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.checkpoint import load_model, save_model
 from icaf4_policy.dataset import SPARE_POINTS
@@ -37,6 +40,8 @@ from icaf4_policy.targets import (
     collate_items,
     draw_item,
     grasp_matches,
+    mean_angles,
+    successful_grasps,
     targets_from_sample,
 )
 from icaf4_policy.training_run import TrainingRun, cosine_rate, keep_freed_memory
@@ -96,6 +101,36 @@ class HeadTrainingConfig:
             raise InvalidArgumentError(f"warmup_share={self.warmup_share} must be in [0, 1).")
 
 
+@dataclass(frozen=True, kw_only=True)
+class HeadKind:
+    """What tells one head from another. Each departure stands for what the released code does.
+
+    Attributes:
+        anchors: what grasps are refined from.
+        sign_blind: anchors are matched by the plain distance between quaternions, as if q and -q,
+            and a grasp with its jaws swapped, were others; axis anchors only.
+        one_pose: of all successful grasps of a point the most central alone is learnt.
+        softmax: the anchors' loss is the cross-entropy of one right anchor, points without any
+            left out; takes one pose.
+        all_residuals: residuals are learnt at all anchors, matched or not; takes one pose and axis
+            anchors.
+    """
+
+    anchors: AnchorConfig
+    sign_blind: bool = False
+    one_pose: bool = False
+    softmax: bool = False
+    all_residuals: bool = False
+
+    def __post_init__(self) -> None:
+        if (self.softmax or self.all_residuals) and not self.one_pose:
+            raise InvalidArgumentError("softmax and all_residuals take one_pose=True.")
+        if (self.sign_blind or self.all_residuals) and self.anchors.kind != "axis":
+            raise InvalidArgumentError(
+                f"kind={self.anchors.kind!r}: sign_blind and all_residuals take axis anchors."
+            )
+
+
 def head_path(folder: Path, name: str, category: str) -> Path:
     """Where the network with the head ``name`` is kept: ``{folder}/{name}/{category}``."""
     return folder / name / f"{category}.safetensors"
@@ -104,7 +139,7 @@ def head_path(folder: Path, name: str, category: str) -> Path:
 def train_heads(
     model: Icaf4,
     samples: Sequence[Sample],
-    anchors: Mapping[str, AnchorConfig],
+    kinds: Mapping[str, HeadKind],
     folder: Path,
     config: HeadTrainingConfig,
     *,
@@ -119,13 +154,13 @@ def train_heads(
     Args:
         model: a trained network of one category that is given colours; not changed.
         samples: training views, read lazily and in a random order.
-        anchors: what each head refines grasps from, by name.
+        kinds: what each head is, by name.
         folder: where the networks are written, see ``head_path``.
         config: how to train.
         samples_sha256: tells these samples from others.
 
     Returns:
-        The paths of the networks, in the order of ``anchors``.
+        The paths of the networks, in the order of ``kinds``.
 
     Raises:
         InvalidArgumentError: a network of several categories or one without colours; samples of
@@ -133,15 +168,15 @@ def train_heads(
             points; a loss that is not finite.
     """
     category = _only_category(model)
-    if not anchors:
-        raise InvalidArgumentError("anchors is empty: expected one head or more.")
+    if not kinds:
+        raise InvalidArgumentError("kinds is empty: expected one head or more.")
     if config.num_grasp_points > model.config.num_points:
         raise InvalidArgumentError(
             f"num_grasp_points={config.num_grasp_points} exceeds the network's "
             f"num_points={model.config.num_points}."
         )
     facts = {"network_sha256": _state_sha256(model), "samples_sha256": samples_sha256}
-    heads = [_Head(name, kind, model, config, facts) for name, kind in anchors.items()]
+    heads = [_Head(name, kind, model, config, facts) for name, kind in kinds.items()]
     paths = [head_path(folder, head.name, category) for head in heads]
     missing = [
         (head, path)
@@ -196,13 +231,14 @@ class _Head:
     def __init__(
         self,
         name: str,
-        kind: AnchorConfig,
+        kind: HeadKind,
         model: Icaf4,
         config: HeadTrainingConfig,
         facts: Mapping[str, str],
     ) -> None:
         self.name, self.kind = name, kind
-        self.anchors = anchors_from_config(kind)
+        self.anchors = anchors_from_config(kind.anchors)
+        self._quaternions = torch.from_numpy(quaternion_from_matrix(self.anchors.rotations)).float()
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(config.seed)
             self.head = GraspHead(
@@ -210,7 +246,9 @@ class _Head:
             )
         # Direct regression has nothing to choose from.
         of_anchors = config.losses.anchors * len(self.anchors) / _WEIGHED_FOR
-        self.weights = replace(config.losses, anchors=0.0 if kind.kind == "direct" else of_anchors)
+        self.weights = replace(
+            config.losses, anchors=0.0 if kind.anchors.kind == "direct" else of_anchors
+        )
         adam = torch.optim.Adam(
             self.head.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
         )
@@ -222,11 +260,57 @@ class _Head:
     def loss(self, features: Tensor, truth: GraspTargets) -> Tensor:
         """At features (B, S, C)."""
         logits, residuals = self.head.at_matches(features, truth.match_index)
-        return total_loss(grasp_terms(logits, residuals, truth), self.weights)
+        terms = grasp_terms(logits, residuals, truth)
+        if self.kind.softmax:
+            terms["anchors"] = self._cross_entropy(logits, truth)
+        if self.kind.all_residuals:
+            terms["residuals"] = self._residuals_everywhere(features, truth)
+        return total_loss(terms, self.weights)
+
+    def _cross_entropy(self, logits: Tensor, truth: GraspTargets) -> Tensor:
+        """Of the right anchor, over L as a mean over anchors is: the weight stays what it is."""
+        point, anchor = self._matches(truth)
+        return F.cross_entropy(logits.flatten(0, 1)[point], anchor) / len(self.anchors)
+
+    def _residuals_everywhere(self, features: Tensor, truth: GraspTargets) -> Tensor:
+        """Squared error of the residuals from all anchors to the one grasp of a point."""
+        point, anchor = self._matches(truth)
+        _, residuals = self.head(features)  # (B, S, L, 4)
+        grasp = self._quaternions[anchor] + truth.match_residual  # (n, 4)
+        wanted = grasp[:, None] - self._quaternions  # (n, L, 4)
+        errors = (residuals.flatten(0, 1)[point] - wanted).square().sum(dim=-1)
+        return errors.sum() / max(errors.numel(), 1)
+
+    def _matches(self, truth: GraspTargets) -> tuple[Tensor, Tensor]:
+        """Point, of all in the batch, and anchor of each match."""
+        count = len(self.anchors)
+        return truth.match_index // count, truth.match_index % count
+
+    def matches(
+        self, sample: Sample
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.floating]]:
+        """What the head should say of a sample, as ``targets.grasp_matches`` gives it."""
+        if not (self.kind.one_pose or self.kind.sign_blind):
+            return grasp_matches(sample, self.anchors)
+        row, R_level_grasp = successful_grasps(sample)
+        if self.kind.one_pose:
+            central = np.lexsort((mean_angles(row, R_level_grasp), row))
+            first = central[np.unique(row[central], return_index=True)[1]]
+            row, R_level_grasp = row[first], R_level_grasp[first]
+        if not self.kind.sign_blind:
+            return row, *self.anchors.match(R_level_grasp)
+        q = quaternion_from_matrix(R_level_grasp)
+        q_anchors = quaternion_from_matrix(self.anchors.rotations)
+        distance = np.linalg.norm(q[:, None] - q_anchors, axis=-1)  # (n, L)
+        matched = np.argmin(distance, axis=-1)
+        order = np.lexsort((distance.min(axis=-1), matched, row))
+        _, first = np.unique(np.stack([row, matched])[:, order], axis=1, return_index=True)
+        kept = order[first]
+        return row[kept], matched[kept], (q - q_anchors[matched])[kept]
 
     def network(self, model: Icaf4) -> Icaf4:
         """A copy of the network with this head."""
-        changed = Icaf4(replace(model.config, anchors=self.kind))
+        changed = Icaf4(replace(model.config, anchors=self.kind.anchors))
         shared = {k: v for k, v in model.state_dict().items() if not k.startswith("grasp.")}
         own = {f"grasp.{k}": v for k, v in self.head.state_dict().items()}
         changed.load_state_dict(deepcopy(shared | own))
@@ -309,7 +393,7 @@ def _with_all_matches(
     rows, matched, residuals = [], [], []
     # The last of ``starts`` is where one more head's anchors would begin.
     for head, start in zip(heads, starts, strict=False):
-        row, anchor, residual = grasp_matches(sample, head.anchors)
+        row, anchor, residual = head.matches(sample)
         rows.append(row)
         matched.append(anchor + start)
         residuals.append(np.pad(residual, ((0, 0), (0, _MOST_NUMBERS - residual.shape[1]))))

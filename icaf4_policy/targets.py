@@ -70,7 +70,7 @@ def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.flo
     return row, R_level_object @ sample.tried_rotations()[row, attempt]
 
 
-def _mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDArray[np.floating]:
+def mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDArray[np.floating]:
     """Mean angle (n,) from each grasp (n, 3, 3) to the others of its point, ``row`` ascending."""
     angles = np.empty(len(row))
     if not len(row):
@@ -95,7 +95,7 @@ def grasp_matches(
     row, R_level_grasp = successful_grasps(sample)
     matched, residual = anchors.match(R_level_grasp)
     if anchors.kind == "direct":
-        rank = _mean_angles(row, R_level_grasp)
+        rank = mean_angles(row, R_level_grasp)
     else:
         rank = np.sum(residual**2, axis=-1)
     order = np.lexsort((rank, matched, row))
