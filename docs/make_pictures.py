@@ -16,13 +16,16 @@ import imageio.v3 as imageio
 import numpy as np
 
 import artgym  # noqa: F401  (registers the environments)
+from artgym.annotation.annotate import labelled_ids
 from artgym.datasets.frame import CameraFrame
-from artgym.datasets.generate import generate_reartmix
+from artgym.datasets.generate import GenerationConfig, generate_reartmix, make_scenes
+from artgym.datasets.sets import SETS
 from artgym.show.label_view import show_labels
 from artgym.show.object_view import show_object
 from artgym.show.sample_view import show_sample
 from icaf4_policy.drawing import draw_predictions
 from icaf4_policy.inference import Perception
+from icaf4_policy.scenes import ScenePerception
 from icaf4_policy.shipped import trained_categories, weights_path
 
 PICTURES = Path(__file__).parent / "pictures"
@@ -31,7 +34,7 @@ PICTURES = Path(__file__).parent / "pictures"
 def perceived(category: str, seed: int = 0) -> np.ndarray:
     """One look (h, 4 w, 3): the picture, parts, affordance, grasps and joint."""
     env = gymnasium.make(
-        "ArtOpen-v0", categories=(category,), split="test", obs_mode="rgbd", camera_size=(360, 270)
+        "ArtOpen-v0", categories=(category,), split="test", obs_mode="rgbd", camera_size=(280, 210)
     )
     observation, _ = env.reset(seed=seed)
     frame = CameraFrame.from_observation(observation)
@@ -53,6 +56,23 @@ def perceived_png() -> bytes:
     return imageio.imwrite("<bytes>", looks, extension=".png")
 
 
+def perceived_scene(number: int, ids: tuple[str, ...]) -> np.ndarray:
+    """One look (h, 4 w, 3) at a scene through the detector."""
+    (picture,) = make_scenes(ids, number, 1, GenerationConfig(camera_size=(360, 270)))
+    rng = np.random.default_rng(number)
+    seen = ScenePerception.load().look(picture.rgb, picture.depth, picture.intrinsics, rng=rng)
+    predictions = [each.prediction for each in seen]
+    panels = draw_predictions(picture.rgb, picture.intrinsics, predictions, num_grasps=3)
+    return np.concatenate([picture.rgb, panels], axis=1)
+
+
+def perceived_scenes_png() -> bytes:
+    """Looks at the first scenes of test objects."""
+    ids = tuple(i for category in SETS["reartmix"] for i in labelled_ids(category, "test"))
+    looks = np.concatenate([perceived_scene(number, ids) for number in range(4)])
+    return imageio.imwrite("<bytes>", looks, extension=".png")
+
+
 def sheet(show: Callable[[Path], tuple[Path, Path]]) -> bytes:
     """The sheet that one of the functions behind `artgym show` writes to a folder."""
     with tempfile.TemporaryDirectory() as folder:
@@ -69,6 +89,7 @@ def shown_sample(folder: Path) -> tuple[Path, Path]:
 
 MADE: dict[str, Callable[[], bytes]] = {
     "perceived": perceived_png,
+    "perceived_scenes": perceived_scenes_png,
     "shown_object": lambda: sheet(lambda out: show_object("laptop/1201", out)),
     "shown_labels": lambda: sheet(lambda out: show_labels("laptop/1201", out)),
     "shown_sample": lambda: sheet(shown_sample),
