@@ -67,7 +67,8 @@ def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.flo
     """
     row, attempt = np.nonzero(sample.successful_tries())
     R_level_object = sample.R_level_camera.astype(float) @ sample.T_camera_object[:3, :3]
-    return row, R_level_object @ sample.tried_rotations()[row, attempt]
+    points, which = np.unique(row, return_inverse=True)
+    return row, R_level_object @ sample.tried_rotations(points)[which, attempt]
 
 
 def mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -109,6 +109,7 @@ def write_pictures(path: str | os.PathLike[str], pictures: Sequence[Picture]) ->
     def fill(file: h5py.File) -> None:
         counts = np.array([len(picture.samples) for picture in pictures], dtype=np.int32)
         put_array(file, _COUNTS, counts, level=_LEVEL)
+        groups = []
         for i, picture in enumerate(pictures):
             group = file.create_group(_picture_name(i))
             put(group, picture, PICTURE_ARRAYS, f"picture {i}", _LEVEL)
@@ -117,6 +118,13 @@ def write_pictures(path: str | os.PathLike[str], pictures: Sequence[Picture]) ->
                 put_text(subgroup, "object_id", sample.object_id)
                 what = f"sample {k} of picture {i} ({sample.object_id})"
                 put(subgroup, sample, SAMPLE_ARRAYS, what, _SAMPLE_LEVEL)
+                groups.append(subgroup)
+        put_array(file, _PLACES, _places(groups), level=_LEVEL)
+        ids = [sample.object_id.encode() for picture in pictures for sample in picture.samples]
+        longest = max(map(len, ids), default=0)
+        padded = b"".join(object_id.ljust(longest, b"\0") for object_id in ids)
+        rows = np.frombuffer(padded, np.uint8).reshape(len(ids), longest)
+        put_array(file, _IDS, rows, level=_LEVEL)
 
     write_file_whole(path, hdf5_image(PICTURES_FORMAT, fill))
 
@@ -134,6 +142,67 @@ def read_pictures(path: str | os.PathLike[str]) -> list[Picture]:
 
 #: The root's array of the number of objects in each picture.
 _COUNTS = "objects"
+
+#: The root's array of where each sample's arrays lie in the file, see ``_places``; and of the
+#: samples' ids, UTF-8 filled up with zeros.
+_PLACES, _IDS = "sample_places", "sample_ids"
+
+#: Sizes that the shapes of a sample's arrays are made of.
+_SIZES = tuple(
+    dict.fromkeys(s for name in SAMPLE_ARRAYS for s in _SHAPES[name] if isinstance(s, str))
+)
+
+
+def _places(groups: Sequence[h5py.Group]) -> NDArray[np.int64]:
+    """For each sample, the sizes of ``_SIZES``, then the offset of each array, -1 of an empty one.
+
+    HDF5 takes some 40 microseconds an array to find it; with these a sample is one piece of the
+    file.
+    """
+    places = np.full((len(groups), len(_SIZES) + len(SAMPLE_ARRAYS)), -1, dtype=np.int64)
+    for row, group in zip(places, groups, strict=True):
+        sizes: dict[str, int] = {}
+        for column, name in enumerate(SAMPLE_ARRAYS, start=len(_SIZES)):
+            found = h5py.h5d.open(group.id, name.encode())
+            for symbol, size in zip(_SHAPES[name], found.shape, strict=True):
+                if isinstance(symbol, str):
+                    sizes[symbol] = size
+            offset = found.get_offset()
+            row[column] = -1 if offset is None else offset
+        row[: len(_SIZES)] = [sizes[symbol] for symbol in _SIZES]
+    return places
+
+
+def _sample_at(path: Path, object_id: str, place: NDArray[np.int64]) -> Sample:
+    """The sample whose arrays lie at a row of ``_places``.
+
+    Raises:
+        DamagedFileError: they do not.
+    """
+    sizes = dict(zip(_SIZES, place[: len(_SIZES)].tolist(), strict=True))
+    spans: dict[str, tuple[int, int, tuple[int, ...]]] = {}
+    for name, offset in zip(SAMPLE_ARRAYS, place[len(_SIZES) :].tolist(), strict=True):
+        shape = tuple(sizes[s] if isinstance(s, str) else s for s in _SHAPES[name])
+        spans[name] = offset, math.prod(shape), shape
+    stored = [(o, o + n * _DTYPES[name].itemsize) for name, (o, n, _) in spans.items() if n]
+    first, last = min(start for start, _ in stored), max(stop for _, stop in stored)
+    try:
+        with path.open("rb") as file:
+            file.seek(first)
+            piece = file.read(last - first)
+    except (OSError, ValueError, MemoryError) as error:
+        raise DamagedFileError(f"{path} cannot be read ({error}). {DAMAGE_REMEDY}") from error
+    if min(place[: len(_SIZES)]) < 0 or len(piece) < last - first:
+        raise DamagedFileError(f"{path}: {_PLACES!r} leads out of the file. {DAMAGE_REMEDY}")
+    arrays = {}
+    for name, (offset, count, shape) in spans.items():
+        start = offset - first if count else 0
+        array = np.frombuffer(piece, _DTYPES[name], count, start).reshape(shape)
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise DamagedFileError(f"{path}: {name} holds values that are not finite.")
+        # What lies in a file lies at any byte.
+        arrays[name] = array.copy()
+    return Sample(object_id=object_id, **arrays)
 
 
 def _picture_name(index: int) -> str:
@@ -167,7 +236,7 @@ def _misfit(arrays: Mapping[str, NDArray[Any]]) -> str | None:
 def _object_counts(file: h5py.File) -> NDArray[np.integer]:
     """How many objects each picture of a shard shows."""
     counts = _arrays(file, [_COUNTS], "the shard")[_COUNTS]
-    groups = sum(1 for name in file if name != _COUNTS)
+    groups = sum(1 for name in file if name not in (_COUNTS, _PLACES, _IDS))
     if counts.ndim != 1 or counts.dtype.kind != "i" or len(counts) != groups:
         raise DamagedFileError(
             f"{_COUNTS} should be {groups} integers, got {counts.shape} of {counts.dtype}"
@@ -198,6 +267,17 @@ def _subgroup(group: h5py.Group, name: str) -> h5py.Group:
     if not isinstance(found, h5py.Group):
         raise DamagedFileError(f"{name!r} in {group.name!r} is no group")
     return found
+
+
+def _found_samples(file: h5py.File, count: int) -> tuple[list[str], NDArray[np.int64]]:
+    """Ids and ``_places`` of all samples of a shard, ``count`` of them."""
+    arrays = _arrays(file, [_PLACES, _IDS], "the shard")
+    places, ids = arrays[_PLACES], arrays[_IDS]
+    if places.shape != (count, len(_SIZES) + len(SAMPLE_ARRAYS)) or places.dtype != np.int64:
+        raise DamagedFileError(f"{_PLACES} is {places.dtype} {places.shape}, for {count} samples")
+    if ids.ndim != 2 or len(ids) != count or ids.dtype != np.uint8:
+        raise DamagedFileError(f"{_IDS} is {ids.dtype} {ids.shape}, for {count} samples")
+    return [row.tobytes().rstrip(b"\0").decode() for row in ids], places
 
 
 def _get_picture(file: h5py.File, index: int, count: int) -> Picture:
@@ -299,11 +379,25 @@ class SampleFolder(_ShardFolder[Sample]):
     def _lengths(self) -> list[int]:
         #: Index of the first sample of each picture, a list a shard.
         self._firsts: list[list[int]] = []
+        #: Ids and ``_places`` of the samples of a shard, once one of them was read.
+        self._found: dict[int, tuple[list[str], NDArray[np.int64]]] = {}
         for shard in range(len(self.manifest.shards)):
             path = self.folder / self.manifest.shards[shard].name
             with opened(path, PICTURES_FORMAT) as file:
                 self._firsts.append([0, *accumulate(_object_counts(file).tolist())])
         return [firsts[-1] for firsts in self._firsts]
+
+    def _item(self, position: int) -> Sample:
+        shard = bisect_right(self._starts, position) - 1
+        if shard not in self._found:
+            with opened(self._verified_path(shard), PICTURES_FORMAT) as file:
+                if not _is_hard_link(file, _PLACES):
+                    # A shard of an earlier version, which does not say.
+                    return self._get(file, position - self._starts[shard], shard)
+                self._found[shard] = _found_samples(file, self._firsts[shard][-1])
+        ids, places = self._found[shard]
+        index = position - self._starts[shard]
+        return _sample_at(self._verified_path(shard), ids[index], places[index])
 
     def _get(self, file: h5py.File, index: int, shard: int) -> Sample:
         firsts = self._firsts[shard]

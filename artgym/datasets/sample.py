@@ -95,11 +95,18 @@ class Sample:
         bits = np.unpackbits(self.grasp_bits, axis=1, count=NUM_CANDIDATES, bitorder="little")
         return bits.astype(bool)
 
-    def tried_rotations(self) -> NDArray[np.floating]:
-        """(G, C, 3, 3): the rotation of each try at each labelled point, object frame."""
+    def tried_rotations(self, points: ArrayLike | slice = slice(None)) -> NDArray[np.floating]:
+        """(g, C, 3, 3): the rotation of each try at g of the labelled points, object frame.
+
+        Args:
+            points: which, (g,) indices; all when left out.
+        """
         R_camera_object = self.T_camera_object[:3, :3].astype(float)
         R_object_parts = R_camera_object.T @ self.T_camera_parts[:, :3, :3]
-        return candidates_of_part(self.grasp_normals_part, R_object_parts[self.grasp_part])
+        chosen = points if isinstance(points, slice) else np.asarray(points, dtype=np.int64)
+        return candidates_of_part(
+            self.grasp_normals_part[chosen], R_object_parts[self.grasp_part[chosen]]
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

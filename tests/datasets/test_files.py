@@ -411,3 +411,52 @@ class TestSampleFolder:
         assert_same(samples[0], random_picture(0).samples[0])
         with pytest.raises(DamagedFileError, match=r"train-2\.h5 has another checksum.*Copy it"):
             samples[2]
+
+    def _rewritten(self, folder, change):
+        """The first shard after a change that its manifest knows of."""
+        path = folder / "train-0.h5"
+        with h5py.File(path, "r+") as file:
+            change(file)
+        manifest = Manifest.read(folder)
+        shards = (ShardEntry.of(path, 2), *manifest.shards[1:])
+        dataclasses.replace(manifest, shards=shards).write(folder)
+        return SampleFolder(folder)
+
+    def test_a_shard_that_does_not_say_where_its_samples_lie_reads_the_same(self, folder):
+        def forget(file):
+            del file["sample_places"]
+
+        samples = self._rewritten(folder, forget)
+        for index in range(2):
+            assert_same(samples[index], random_picture(index).samples[0])
+
+    @pytest.mark.parametrize("column", [0, 5])
+    @pytest.mark.parametrize("value", [-7, 2**40])
+    def test_places_outside_the_file_are_found(self, folder, column, value):
+        def lie(file):
+            file["sample_places"][0, column] = value
+
+        with pytest.raises(DamagedFileError, match=r"train-0\.h5"):
+            self._rewritten(folder, lie)[0]
+
+    def test_places_of_another_number_of_samples_are_found(self, folder):
+        def shorten(file):
+            places = file["sample_places"][:1]
+            del file["sample_places"]
+            file["sample_places"] = places
+
+        with pytest.raises(DamagedFileError, match="for 2 samples"):
+            self._rewritten(folder, shorten)[0]
+
+    def test_a_sample_without_labels(self, tmp_path):
+        picture = random_picture(0)
+        (sample,) = picture.samples
+        empty = {
+            name: getattr(sample, name)[:0]
+            for name in ("grasp_bits", "grasp_points_part", "grasp_normals_part", "grasp_part")
+        }
+        bare = dataclasses.replace(sample, grasp_row=np.full_like(sample.grasp_row, -1), **empty)
+        write_pictures(tmp_path / "a.h5", [dataclasses.replace(picture, samples=(bare,))])
+        shards = (ShardEntry.of(tmp_path / "a.h5", 1),)
+        Manifest(config={}, planned=1, shards=shards).write(tmp_path)
+        assert_same(SampleFolder(tmp_path)[0], bare)
