@@ -93,20 +93,19 @@ def draw_predictions(
     panels = [Image.fromarray(rgb // 2) for _ in range(3)]
     drawn = [ImageDraw.Draw(panel) for panel in panels]
     for prediction in predictions:
-        _draw(*drawn, np.asarray(intrinsics), prediction, num_grasps, max(1, rgb.shape[1] // 200))
+        _draw(drawn, np.asarray(intrinsics), prediction, num_grasps, max(1, rgb.shape[1] // 200))
     return np.concatenate([np.asarray(panel) for panel in panels], axis=1)
 
 
 def _draw(
-    parts: ImageDraw.ImageDraw,
-    affordance: ImageDraw.ImageDraw,
-    grasps: ImageDraw.ImageDraw,
+    panels: Sequence[ImageDraw.ImageDraw],
     intrinsics: NDArray[np.floating],
     prediction: Prediction,
     num_grasps: int,
     width: int,
 ) -> None:
     """One object into the three panels."""
+    parts, affordance, grasps = panels
     corners = project(prediction.points_camera, intrinsics)
     for (u, v), part, value in zip(
         corners.tolist(), prediction.part, prediction.affordance, strict=True
