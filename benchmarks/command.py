@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from artgym.errors import ArtgymError
+from artgym.errors import ArtgymError, UnknownNameError
 
 #: Columns of printed tables where they are not shown on a terminal.
 _WIDTH = 180
@@ -62,3 +62,28 @@ def run(
         console.print(table)
     print(f"wrote {config.out / getattr(config, 'result_name', name)}.json")
     return 0
+
+
+def run_named(
+    name: str,
+    what: str,
+    choices: Mapping[str, Callable[[Sequence[str]], int]],
+    arguments: Sequence[str] | None,
+) -> int:
+    """Runs ``python -m benchmarks.NAME WORD ...``, where the word names one of several benchmarks.
+
+    Args:
+        name: of the module.
+        what: the word is: "question".
+        choices: by word, the functions that take the command line after it.
+        arguments: what follows on the command line; by default the process's own.
+
+    Returns:
+        The exit status, see ``run``; 2 where the word is none of ours.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if not arguments or arguments[0] not in choices:
+        word = arguments[0] if arguments else ""
+        print(f"{name}: {UnknownNameError(what, word, choices)}", file=sys.stderr)
+        return 2
+    return choices[arguments[0]](arguments[1:])
