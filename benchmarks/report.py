@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import statistics
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,16 @@ PAGES = (
 )
 
 
+def _line(cells: Sequence[str]) -> str:
+    """A line of a Markdown table."""
+    return f"| {' | '.join(cells)} |"
+
+
+def _head(cells: Sequence[str]) -> list[str]:
+    """Its first two lines."""
+    return [_line(cells), "|" + "---|" * len(cells)]
+
+
 def _rate(row: Mapping[str, Any]) -> str:
     """Success with its interval: "98 % (87-100)"."""
     low, high = row["success_interval"]
@@ -37,16 +47,16 @@ def _rate(row: Mapping[str, Any]) -> str:
 def success_rate_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``success_rate.json``, categories by policies."""
     policies = result["config"]["policy"]
-    lines = [f"| success, gripped | {' | '.join(policies)} |", "|---|" + "---|" * len(policies)]
+    lines = _head(["success, gripped", *policies])
     for category, rows in result["rows"].items():
         cells = [f"{_rate(rows[p])}, {100 * rows[p]['success_gripped']:.0f} %" for p in policies]
-        lines.append(f"| {category} | " + " | ".join(cells) + " |")
+        lines.append(_line([category, *cells]))
     means = [
         [100 * statistics.fmean(row[p][key] for row in result["rows"].values()) for p in policies]
         for key in ("success", "success_gripped")
     ]
     cells = [f"{success:.0f} %, {gripped:.0f} %" for success, gripped in zip(*means, strict=True)]
-    lines.append("| mean | " + " | ".join(cells) + " |")
+    lines.append(_line(["mean", *cells]))
     config = result["config"]
     count = config["objects"] * config["episodes"]
     lines += [
@@ -83,14 +93,14 @@ _METHOD_LABELS = {"icaf4": "", "ah_where": "AH-Where", "daisy": "DAISY", "fpfh":
 def object_table_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``object_table.json``: a category and method a line, the paper's too."""
     heads = [heading for heading, _, _ in _OBJECT_COLUMNS]
-    lines = ["| | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
+    lines = _head(["", *heads])
 
     def line(name: str, values: Mapping[str, float | None]) -> str:
         cells = []
         for _, key, form in _OBJECT_COLUMNS:
             value = values.get(key)
             cells.append("" if value is None else form.format(value))
-        return "| " + " | ".join([name, *cells]) + " |"
+        return _line([name, *cells])
 
     for category, methods in result["metrics"].items():
         for method, values in methods.items():
@@ -111,14 +121,14 @@ def object_table_block(result: Mapping[str, Any]) -> str:
 def scene_table_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``scene_table.json``: mean average precision, the paper's beneath."""
     columns = list(result["rows"]["mean"])
-    lines = ["| | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]
+    lines = _head(["", *columns])
     for category, row in result["rows"].items():
         cells = [f"{row[column]:.3f}" for column in columns]
-        lines.append("| " + " | ".join([category, *cells]) + " |")
+        lines.append(_line([category, *cells]))
         paper = result["paper"].get(category)
         if paper:
             cells = [f"{paper[column]:.2f}" for column in columns]
-            lines.append("| " + " | ".join([f"{category}, paper", *cells]) + " |")
+            lines.append(_line([f"{category}, paper", *cells]))
     detector = result["detector"]
     lines += [
         "",
@@ -195,7 +205,7 @@ def solvability_block(result: Mapping[str, Any]) -> str:
                 continue
             cells.append(_rate(row["expert"]))
             cells += [f"{100 * row[policy]['success']:.0f} %" for policy in ("zero", "random")]
-        lines.append("| " + " | ".join(cells) + " |")
+        lines.append(_line(cells))
     lines += [
         "",
         f"{result['config']['objects']} test objects a cell, one episode each, their movable parts "
@@ -219,7 +229,7 @@ def env_speed_block(result: Mapping[str, Any]) -> str:
                 f"{row['ratio']:.2f} (> {row['lower']:.2f})",
             ]
         cells.append("" if comparison["target"] is None else f"{comparison['target']:g}")
-        lines.append("| " + " | ".join(cells) + " |")
+        lines.append(_line(cells))
     pairs = result["config"]["pairs"]
     lines += [
         "",
@@ -257,7 +267,7 @@ def labels_block(result: Mapping[str, Any]) -> str:
         cells.append(mean(lambda row: row["density_at_graspable_points"]))
         for i in range(len(tilts)):
             cells.append(mean(lambda row, i=i: row["rings"][i]["density"]))
-        lines.append(f"| {category} | " + " | ".join(cells) + " |")
+        lines.append(_line([category, *cells]))
     lines += [
         "",
         f"{total['objects']} objects; {total['tries']:,} tries at {total['points']:,} points, of "
@@ -373,7 +383,7 @@ def real_frame_block(result: Mapping[str, Any]) -> str:
         for part in (result[name] or {"parts": (None, None)})["parts"]:
             cells.append("not found" if part is None else f"{part['rotation_deg']:.1f}")
             cells.append("" if part is None else f"{1000 * part['translation_m']:.0f}")
-        lines.append("| " + " | ".join(cells) + " |")
+        lines.append(_line(cells))
     return "\n".join(lines)
 
 
@@ -402,7 +412,7 @@ def anchor_table_block(result: Mapping[str, Any]) -> str:
                 _number(row["coverage@15"], 2),
                 "" if paper is None else f"{paper:g}",
             ]
-        lines.append("| " + " | ".join(cells) + " |")
+        lines.append(_line(cells))
     affordance = ", ".join(
         f"{c} {_number(row['affordance_miou'], 3)}" for c, row in categories.items()
     )
