@@ -16,6 +16,7 @@ from torch.nn import functional as F
 
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.backbone.exact_linear import ExactLinear
+from icaf4_policy.backbone.folding import folded, normalized
 from icaf4_policy.backbone.point_ops import neighborhoods
 from icaf4_policy.backbone.set_abstraction import group_max
 
@@ -72,7 +73,11 @@ class SetAbstraction(nn.Module):
         self, features: Tensor, points: Tensor, centers: Tensor, neighbors: Tensor
     ) -> Tensor:
         """(Q, O) from features (P, C), points (P, 3), centers (Q, 3) and neighbors (Q, S)."""
-        lifted = self.norm_features(self.features(features)) + self.offsets(points)
+        if self.training:
+            lifted = self.norm_features(self.features(features)) + self.offsets(points)
+        else:
+            weight, bias = folded(self.features, self.norm_features)
+            lifted = F.linear(points, self.offsets.weight, bias).addmm_(features, weight.t())
         grouped = group_max(lifted.float(), self.offsets(centers), self.project.weight, neighbors)
         return F.relu(self.norm(grouped))
 
@@ -102,14 +107,21 @@ class FeaturePropagation(nn.Module):
     ) -> Tensor:
         """(P, O) from centers (Q, C), points (P, D), nearest (P, 3) and weights (P, 3)."""
         # Interpolation is linear, so the wide product is taken on the few centers.
-        carried = F.embedding_bag(
-            nearest,
-            self.from_centers(center_features).float(),
-            per_sample_weights=weights,
-            mode="sum",
-        )
-        hidden = F.relu(self.norm1(carried + self.from_points(point_features)))
-        return F.relu(self.norm2(self.mix(hidden)))
+        if self.training:
+            carried = _interpolated(self.from_centers(center_features), nearest, weights)
+            hidden = F.relu(self.norm1(carried + self.from_points(point_features)))
+            return F.relu(self.norm2(self.mix(hidden)))
+        of_centers, bias = folded(self.from_centers, self.norm1)
+        of_points, _ = folded(self.from_points, self.norm1)
+        # The weights of the three centers sum to one, and so do their shares of the bias.
+        carried = _interpolated(F.linear(center_features, of_centers, bias), nearest, weights)
+        hidden = carried.addmm_(point_features, of_points.t()).relu_()
+        return F.linear(hidden, *folded(self.mix, self.norm2)).relu_()
+
+
+def _interpolated(features: Tensor, nearest: Tensor, weights: Tensor) -> Tensor:
+    """(P, C): of the features (Q, C) of centers at points, by nearest (P, 3) and weights (P, 3)."""
+    return F.embedding_bag(nearest, features.float(), per_sample_weights=weights, mode="sum")
 
 
 class PointNet2(nn.Module):
@@ -154,9 +166,9 @@ class PointNet2(nn.Module):
         x0 = torch.cat([xyz0, features.reshape(batch * num_points, -1)], dim=-1)
         x1 = self.abstraction1(x0, xyz0, xyz1, near.neighbors1.flatten(0, 1))  # (B n1, c1)
         x2 = self.abstraction2(x1, xyz1, xyz2, near.neighbors2.flatten(0, 1))  # (B n2, c2)
-        whole = F.relu(self.whole_norm1(self.whole1(torch.cat([x2, xyz2], dim=-1))))
+        whole = F.relu(normalized(self.whole1, self.whole_norm1, torch.cat([x2, xyz2], dim=-1)))
         # Here the maximum comes last: statistics of a few clouds would be too noisy.
-        whole = F.relu(self.whole_norm2(self.whole2(whole)))
+        whole = F.relu(normalized(self.whole2, self.whole_norm2, whole))
         whole = whole.view(batch, self.config.centers[1], -1).amax(dim=1)  # (B, g)
         spread = self.broadcast(whole).repeat_interleave(self.config.centers[1], dim=0)
         x2 = F.relu(self.broadcast_norm(self.own(x2) + spread))  # (B n2, c2)

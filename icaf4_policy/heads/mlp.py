@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any, cast
+
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from icaf4_policy.backbone.exact_linear import ExactLinear
+from icaf4_policy.backbone.folding import normalized
 
 
 class PointMLP(nn.Module):
@@ -24,4 +29,11 @@ class PointMLP(nn.Module):
 
     def forward(self, features: Tensor) -> Tensor:
         """(..., out_channels) from (..., in_channels)."""
-        return self.layers(features.flatten(0, -2)).unflatten(0, features.shape[:-1])
+        hidden = features.flatten(0, -2)
+        if self.training:
+            hidden = self.layers(hidden)
+        else:
+            first, norm1, _, second, norm2, _, last = cast(Iterable[Any], self.layers)
+            hidden = F.relu(normalized(first, norm1, hidden), inplace=True)
+            hidden = last(F.relu(normalized(second, norm2, hidden), inplace=True))
+        return hidden.unflatten(0, features.shape[:-1])
