@@ -43,7 +43,7 @@ class BaselinesConfig:
         seed: of everything.
     """
 
-    pictures: int = 400
+    pictures: int = 240
     epochs: int = 10
     heads: HeadTrainingConfig = field(default_factory=HeadTrainingConfig)
     seed: int = 0
