@@ -8,6 +8,7 @@ import torch
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
+from icaf4_policy.heads.mlp import PointMLP
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.targets import DrawConfig, collate_items, draw_item, targets_from_sample
@@ -50,6 +51,18 @@ def test_residuals_at_matches_are_those_of_all(network, training):
     at_matches = head.at_matches(features, batch.match_index)
     torch.testing.assert_close(at_matches[0], logits)
     torch.testing.assert_close(at_matches[1], residuals.flatten(0, 2)[batch.match_index])
+
+
+def test_in_use_a_head_says_what_its_layers_say():
+    torch.manual_seed(0)
+    head = PointMLP(16, 24, 5)
+    with torch.no_grad():
+        for _ in range(3):
+            head(2.0 * torch.randn(4, 50, 16) + 1.0)
+    head.eval()
+    features = torch.randn(2, 7, 16)
+    told = head.layers(features.flatten(0, 1)).unflatten(0, (2, 7))
+    torch.testing.assert_close(head(features), told, rtol=1e-5, atol=1e-6)
 
 
 def test_shapes(network):
