@@ -79,7 +79,8 @@ class ModelConfig:
 class Outputs:
     """What the heads say.
 
-    B clouds, N points, K parts, S points asked for grasps, L anchors with residuals of r numbers.
+    B clouds, N points that were asked about, K parts, S points asked for grasps, L anchors with
+    residuals of r numbers.
 
     Attributes:
         unit: (B, 1, 1), metres of one network unit.
@@ -138,6 +139,8 @@ class Icaf4(nn.Module):
         colors: Tensor,
         category: Tensor,
         grasp_points: Tensor | int | None = None,
+        *,
+        asked: int | None = None,
     ) -> Outputs:
         """One pass over a batch of clouds.
 
@@ -147,6 +150,8 @@ class Icaf4(nn.Module):
             category: int64 (B,), into ``config.categories``.
             grasp_points: the points whose grasps are wanted: int64 (B, S), or how many of the
                 points of highest affordance; all when left out.
+            asked: of each cloud the first so many points are asked about, the others being their
+                surroundings; all when left out.
         """
         given = [colors - 0.5]
         if len(self.config.categories) > 1:
@@ -158,8 +163,8 @@ class Icaf4(nn.Module):
             own = own[:, None, None]  # (B, 1, 1)
             given.append((own / unit).log().expand(-1, points_level.shape[1], -1))
             unit = own
-        # (B, N, C)
-        features: Tensor = self.backbone(points_level / unit, torch.cat(given, dim=-1))
+        # (B, asked, C)
+        features: Tensor = self.backbone(points_level / unit, torch.cat(given, dim=-1), asked=asked)
         affordance: Tensor = self.affordance(features)
         if grasp_points is None:
             grasp_points = features.shape[1]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from artgym.datasets.sample import (
+    AFFORDANCE_UNKNOWN,
     AFFORDANCE_YES,
     JOINT_NONE,
     JOINT_REVOLUTE,
@@ -172,18 +173,18 @@ class GraspTargets:
 
 @dataclass(frozen=True, kw_only=True)
 class Batch(GraspTargets):
-    """B clouds of N points with their targets; S points a cloud carry grasp targets.
+    """B clouds of N points with the targets of P of them; S of these carry grasp targets.
 
     Attributes:
         points_level: float32 (B, N, 3), metres, and colors: float32 (B, N, 3) in [0, 1], or
             descriptors (B, N, C).
         category: int64 (B,).
-        part: int64 (B, N).
-        npcs: float32 (B, N, 3) and naocs: float32 (B, N, 3).
-        affordance: int64 (B, N), 255 where unknown.
-        joint_type: int64 (B, N), code plus one, of the joint that moves the point's part.
-        joint_axis: float32 (B, N, 3), level frame, zeros without a joint.
-        joint_offset: float32 (B, N, 3), metres, point to nearest axis point, zeros unless revolute.
+        part: int64 (B, P), of the first P points, as all that follows.
+        npcs: float32 (B, P, 3) and naocs: float32 (B, P, 3).
+        affordance: int64 (B, P), 255 where unknown.
+        joint_type: int64 (B, P), code plus one, of the joint that moves the point's part.
+        joint_axis: float32 (B, P, 3), level frame, zeros without a joint.
+        joint_offset: float32 (B, P, 3), metres, point to nearest axis point, zeros unless revolute.
         grasp_points: int64 (B, S).
     """
 
@@ -210,6 +211,8 @@ class DrawConfig:
 
     Attributes:
         num_points: N.
+        learn_points: P, the points of each cloud that are learnt, at most N: those whose affordance
+            is known, up to half, and others; the rest are their surroundings. None for all.
         num_anchors: L.
         num_grasp_points: S.
         negative_share: share of S given to points where every try failed.
@@ -219,6 +222,7 @@ class DrawConfig:
 
     num_points: int
     num_anchors: int
+    learn_points: int | None = None
     num_grasp_points: int = 384
     negative_share: float = 0.25
     negative_weight: float = 0.3
@@ -242,18 +246,22 @@ Item = dict[str, NDArray[Any]]
 def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) -> Item:
     """A fresh choice of a sample's points, with all their targets."""
     pick = choose_points(len(targets.points_level), config.num_points, rng)
-    points, part = targets.points_level[pick], targets.part[pick]
+    if config.learn_points is not None and config.learn_points < len(pick):
+        pick = _learnt_first(pick, targets, config.learn_points, rng)
+    points = targets.points_level[pick]
     colors = targets.colors[pick].astype(np.float32) / 255.0
     if config.color_jitter > 0:
         colors = _jittered(colors, config.color_jitter, rng)
 
+    learnt = pick[: config.learn_points]
+    part = targets.part[learnt]
     joint_type = targets.joint_type[part]
     axis = targets.axis_level[part]
-    to_pivot = targets.pivot_level[part] - points
+    to_pivot = targets.pivot_level[part] - points[: len(learnt)]
     offset = to_pivot - np.sum(to_pivot * axis, axis=-1, keepdims=True) * axis
     offset[joint_type != JOINT_REVOLUTE - JOINT_NONE] = 0.0
 
-    affordance, row = targets.affordance[pick], targets.grasp_row[pick]
+    affordance, row = targets.affordance[learnt], targets.grasp_row[learnt]
     good = rng.permutation(np.flatnonzero((affordance == AFFORDANCE_YES) & (row >= 0)))
     bad = rng.permutation(np.flatnonzero((affordance != AFFORDANCE_YES) & (row >= 0)))
     bad = bad[: int(config.negative_share * config.num_grasp_points)]
@@ -276,8 +284,8 @@ def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) ->
         "colors": colors,
         "category": np.array(targets.category, dtype=np.int64),
         "part": part.astype(np.int64),
-        "npcs": targets.npcs[pick].astype(np.float32),
-        "naocs": targets.naocs[pick].astype(np.float32),
+        "npcs": targets.npcs[learnt].astype(np.float32),
+        "naocs": targets.naocs[learnt].astype(np.float32),
         "affordance": affordance.astype(np.int64),
         "joint_type": joint_type.astype(np.int64),
         "joint_axis": axis,
@@ -287,6 +295,16 @@ def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) ->
         "match_index": index.astype(np.int64),
         "match_residual": targets.match_residual[match].astype(np.float32),
     }
+
+
+def _learnt_first(
+    pick: NDArray[np.int64], targets: Targets, count: int, rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """The same points, those to be learnt first; see ``DrawConfig.learn_points``."""
+    shuffled = rng.permutation(pick)
+    known = np.flatnonzero(targets.affordance[shuffled] != AFFORDANCE_UNKNOWN)[: count // 2]
+    others = np.delete(shuffled, known)
+    return np.concatenate([shuffled[known], others])
 
 
 #: What of an item is about its grasps: the fields of ``GraspTargets`` without ``anchor_mask``.

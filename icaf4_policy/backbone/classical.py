@@ -67,9 +67,13 @@ class PointwiseBackbone(nn.Module):
         self.linear = nn.Linear(in_channels, width_out, bias=False)
         self.norm = nn.BatchNorm1d(width_out)
 
-    def forward(self, points: Tensor, features: Tensor) -> Tensor:
-        """Features (B, N, width_out) from descriptors (B, N, C); points (B, N, 3) are not used."""
+    def forward(self, points: Tensor, features: Tensor, *, asked: int | None = None) -> Tensor:
+        """Features (B, asked, width_out) from descriptors (B, N, C); see ``PointNet2.forward``.
+
+        The points (B, N, 3) are not used.
+        """
         del points
+        features = features[:, :asked]
         hidden: Tensor = F.relu(self.norm(self.linear(features.flatten(0, 1))))  # (B N, o)
         return hidden.unflatten(0, features.shape[:2])
 

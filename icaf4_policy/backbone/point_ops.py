@@ -138,7 +138,8 @@ class Neighborhoods:
     Attributes:
         centers1: int64 (B, n1) into the points; neighbors1: (B, n1, s1) into the points.
         centers2: int64 (B, n2) into the level-1 centers; neighbors2: (B, n2, s2), likewise.
-        up1: int64 (B, N, 3) into the level-1 centers, and weights_up1 float32 (B, N, 3).
+        up1: int64 (B, P, 3) into the level-1 centers, and weights_up1 float32 (B, P, 3), of the
+            first P points of each cloud.
         up2: int64 (B, n1, 3) into the level-2 centers, and weights_up2 float32 (B, n1, 3).
     """
 
@@ -153,7 +154,12 @@ class Neighborhoods:
 
 
 def neighborhoods(
-    points: Tensor, *, counts: tuple[int, int], radii: tuple[float, float], neighbors: int
+    points: Tensor,
+    *,
+    counts: tuple[int, int],
+    radii: tuple[float, float],
+    neighbors: int,
+    asked: int | None = None,
 ) -> Neighborhoods:
     """Samples two levels of centers and finds every neighbour the backbone needs.
 
@@ -164,6 +170,7 @@ def neighborhoods(
         counts: centers at each level, n1 > n2 >= 3.
         radii: radius of the balls at each level, network units.
         neighbors: neighbours of each center.
+        asked: P; all points by default.
     """
     if points.ndim != 3 or points.shape[-1] != 3 or points.shape[1] < counts[0]:
         raise InvalidArgumentError(
@@ -177,7 +184,7 @@ def neighborhoods(
         cloud1 = cloud[centers1]
         centers2 = farthest_points(cloud1, n2)
         cloud2 = cloud1[centers2]
-        up1, weights_up1 = three_nearest(cloud, cloud1)
+        up1, weights_up1 = three_nearest(cloud[:asked], cloud1)
         up2, weights_up2 = three_nearest(cloud1, cloud2)
         neighbors1 = ball_query(cloud, cloud1, radii[0], neighbors)
         neighbors2 = ball_query(cloud1, cloud2, radii[1], neighbors)

@@ -151,14 +151,21 @@ class PointNet2(nn.Module):
             config.width_out, point_channels, (config.width_out, config.width_out), ExactLinear
         )
 
-    def forward(self, points: Tensor, features: Tensor) -> Tensor:
-        """Features (B, N, width_out) from points (B, N, 3), network units, and theirs (B, N, C)."""
+    def forward(self, points: Tensor, features: Tensor, *, asked: int | None = None) -> Tensor:
+        """Features (B, asked, width_out) of the first points of each cloud; of all by default.
+
+        Args:
+            points: (B, N, 3), network units.
+            features: (B, N, C), what is given of them.
+            asked: how many are asked about.
+        """
         batch, num_points, _ = points.shape
         near = neighborhoods(
             points,
             counts=self.config.centers,
             radii=self.config.radii,
             neighbors=self.config.neighbors,
+            asked=asked,
         )
         xyz0 = points.reshape(-1, 3)  # (B N, 3)
         xyz1 = xyz0[near.centers1.flatten()]  # (B n1, 3)
@@ -175,5 +182,6 @@ class PointNet2(nn.Module):
         x1 = self.propagation2(
             x2, x1, near.up2.flatten(0, 1), near.weights_up2.flatten(0, 1)
         )  # (B n1, o)
+        x0 = x0.view(batch, num_points, -1)[:, :asked].flatten(0, 1)
         x0 = self.propagation1(x1, x0, near.up1.flatten(0, 1), near.weights_up1.flatten(0, 1))
-        return x0.view(batch, num_points, -1)
+        return x0.view(batch, near.up1.shape[1], -1)

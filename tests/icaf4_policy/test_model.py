@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import torch
 
+from artgym.datasets.sample import AFFORDANCE_UNKNOWN
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
@@ -109,6 +110,38 @@ def test_a_cloud_is_its_own_measure(network):
     torch.testing.assert_close(grown, points)
     torch.testing.assert_close(told_grown[..., :3], told[..., :3])
     torch.testing.assert_close(told_grown[..., 3] - told[..., 3], torch.full((2, 256), np.log(3)))
+
+
+def test_the_first_points_can_be_asked_about_alone(network):
+    batch = toy_batch()
+    cloud = batch.points_level, batch.colors, batch.category
+    whole, some = network.eval()(*cloud), network(*cloud, asked=100)
+    for name, value in tensors(some).items():
+        if name == "unit" or value.ndim < 3:
+            continue
+        if name in ("anchors", "residuals"):
+            # Asked about at all points, in the order of their affordance.
+            assert value.shape[1] == 100
+            continue
+        torch.testing.assert_close(value, getattr(whole, name)[:, :100], msg=name)
+
+
+def test_learnt_points_come_first_and_keep_their_surroundings():
+    targets = targets_from_sample(toy_sample(0), ["toy"], anchors_from_config(AnchorConfig()), 2048)
+    draw = dataclasses.replace(DRAW, num_points=400, learn_points=120)
+    item = draw_item(targets, draw, np.random.default_rng(0))
+    assert item["points_level"].shape == (400, 3)
+    assert len(np.unique(item["points_level"], axis=0)) == 400
+    assert {len(item[n]) for n in ("part", "npcs", "affordance", "joint_offset")} == {120}
+    known = item["affordance"] != AFFORDANCE_UNKNOWN
+    assert known[:60].all()
+    learnt = [
+        np.flatnonzero((targets.points_level == point).all(axis=1))[0]
+        for point in item["points_level"][:120]
+    ]
+    np.testing.assert_array_equal(item["part"], targets.part[learnt])
+    np.testing.assert_array_equal(item["npcs"], targets.npcs[learnt].astype(np.float32))
+    assert item["grasp_points"].max() < 120
 
 
 def test_order_of_points_does_not_matter(network):
