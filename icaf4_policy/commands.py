@@ -41,6 +41,7 @@ def train(
     *,
     data: Path,
     out: Path,
+    scenes: Path | None = None,
     log: Path | None = None,
     device: str = "auto",
     threads: int = 1,
@@ -53,6 +54,8 @@ def train(
             one of the authors' with `{category}/train.txt` and the listed files, of one category,
             where every eighth object of the list chooses the weights.
         out: weights to write, ending in .safetensors.
+        scenes: folder with `train` and `val`, made by `artgym generate reartmix`, whose objects of
+            the categories are learnt too: turned anyhow and partly hidden.
         log: folder for TensorBoard.
         device: cpu, cuda, cuda:1, ...; auto takes a GPU if there is one. Several GPUs train several
             networks at once, a command each. Only the CPU gives the same bytes again.
@@ -62,7 +65,7 @@ def train(
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     device = _usable(device)
-    samples = _training_samples(data, config.category, config.features)
+    samples = _training_samples(data, scenes, config.category, config.features)
     run_training(config, *samples, out, log=log, device=device)
     print(f"wrote {out} and {description_path(out)}")
     return 0
@@ -82,13 +85,13 @@ def _usable(device: str) -> str:
 
 
 def _training_samples(
-    data: Path, categories: Sequence[str], features: Features
+    data: Path, scenes: Path | None, categories: Sequence[str], features: Features
 ) -> tuple[Samples, Samples]:
     """Those to train with, and those of other objects that choose the weights."""
     listed = [c for c in categories if (data / c / "train.txt").is_file()]
     if not listed:
         training, validation = (
-            _split(data, categories, split, features) for split in ("train", "val")
+            _split(data, scenes, categories, split, features) for split in ("train", "val")
         )
         return training, validation
     if len(categories) > 1:
@@ -102,6 +105,11 @@ def _training_samples(
             "pictures to describe points by. Train with features 'color', or on what 'artgym "
             "generate' makes."
         )
+    if scenes is not None:
+        raise InvalidArgumentError(
+            f"scenes={str(scenes)!r}: {data / listed[0]} holds the authors' data, which is trained "
+            "with alone."
+        )
     samples = AuthorsFolder(data, listed[0], "train")
     numbers = [sample.urdf_id for sample in samples]
     chosen = set(sorted(set(numbers))[::_AUTHORS_VALIDATION])
@@ -112,14 +120,28 @@ def _training_samples(
 
 
 def _split(
-    data: Path, categories: Sequence[str], split: str, features: Features
+    data: Path, scenes: Path | None, categories: Sequence[str], split: str, features: Features
 ) -> Iterator[Sample]:
-    folders = [data / category / split for category in categories]
+    for category in categories:
+        yield from _samples(data / category / split, features)
+    if scenes is not None:
+        yield from _samples(scenes / split, features, categories)
+
+
+def _samples(
+    folder: Path, features: Features, categories: Sequence[str] | None = None
+) -> Iterator[Sample]:
+    """The samples of a folder, described; of some categories, or all."""
+
+    def wanted(sample: Sample) -> bool:
+        return categories is None or sample.object_id.partition("/")[0] in categories
+
     if features == "color":
         # Pictures take far longer to read than samples.
-        return chain.from_iterable(SampleFolder(folder) for folder in folders)
-    pictures = chain.from_iterable(PictureFolder(folder) for folder in folders)
-    return (described(picture, s, features) for picture in pictures for s in picture.samples)
+        yield from filter(wanted, SampleFolder(folder))
+        return
+    for picture in PictureFolder(folder):
+        yield from (described(picture, s, features) for s in picture.samples if wanted(s))
 
 
 def train_detector(

@@ -161,6 +161,35 @@ def test_train_command(tmp_path, samples, capsys):
     assert (facts["training_samples"], facts["validation_samples"]) == tuple(map(len, samples))
 
 
+def test_scenes_add_their_objects_of_the_category(tmp_path, samples, capsys):
+    def written(folder, parts):
+        for split, part in zip(("train", "val"), parts, strict=True):
+            write_pictures(folder / split / "0000.h5", part)
+            shard = ShardEntry.of(folder / split / "0000.h5", len(part))
+            Manifest(config={}, planned=1, shards=(shard,)).write(folder / split)
+
+    pictures = [[toy_picture(i) for i in part] for part in ((0, 1, 2), (3,))]
+    written(tmp_path / "data" / "toy", pictures)
+    strange = [
+        [
+            dataclasses.replace(
+                picture,
+                samples=(dataclasses.replace(picture.samples[0], object_id=f"{name}/0000"),),
+            )
+            for name, picture in zip(("toy", "mug"), part * 2, strict=False)
+        ]
+        for part in pictures
+    ]
+    written(tmp_path / "scenes", strange)
+    weights = tmp_path / "toy.safetensors"
+    arguments = ["train", "--category", "toy", "--data", str(tmp_path / "data")]
+    arguments += ["--scenes", str(tmp_path / "scenes"), "--out", str(weights), "--epochs", "1"]
+    arguments += ["--num-points", "512", "--num-grasp-points", "32", "--batch-size", "2"]
+    assert cli.main(arguments) == 0
+    facts = load_model(weights)[1]["training"]
+    assert (facts["training_samples"], facts["validation_samples"]) == (3 + 1, 1 + 1)
+
+
 @pytest.fixture
 def saved(tmp_path):
     torch.manual_seed(0)
