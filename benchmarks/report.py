@@ -121,7 +121,7 @@ def object_table_block(result: Mapping[str, Any]) -> str:
 def scene_table_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``scene_table.json``: mean average precision, the paper's beneath."""
     columns = list(result["rows"]["mean"])
-    lines = _head(["", *columns])
+    lines = _head(["", *(column.replace("_", " ").replace("@", ", ") for column in columns)])
     for category, row in result["rows"].items():
         cells = [f"{row[column]:.3f}" for column in columns]
         lines.append(_line([category, *cells]))
