@@ -93,7 +93,6 @@ def _score(
     perception: Any, picture: Picture, method: Method, task: ViewsTask, number: int
 ) -> dict[str, float]:
     from icaf4_policy.backbone.classical import described
-
     from icaf4_policy.evaluation import evaluate_sample
 
     rng = np.random.default_rng([task.seed, zlib.crc32(task.object_id.encode()), number])

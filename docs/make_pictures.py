@@ -34,7 +34,7 @@ PICTURES = Path(__file__).parent / "pictures"
 def perceived(category: str, seed: int = 0) -> np.ndarray:
     """One look (h, 4 w, 3): the picture, parts, affordance, grasps and joint."""
     env = gymnasium.make(
-        "ArtOpen-v0", categories=(category,), split="test", obs_mode="rgbd", camera_size=(280, 210)
+        "ArtOpen-v0", categories=(category,), split="test", obs_mode="rgbd", camera_size=(240, 180)
     )
     observation, _ = env.reset(seed=seed)
     frame = CameraFrame.from_observation(observation)
@@ -51,9 +51,12 @@ def perceived(category: str, seed: int = 0) -> np.ndarray:
 
 
 def perceived_png() -> bytes:
-    """Looks at all categories that have a network."""
-    looks = np.concatenate([perceived(name) for name in trained_categories()])
-    return imageio.imwrite("<bytes>", looks, extension=".png")
+    """Looks at all categories that have a network, two in a row."""
+    looks = [perceived(name) for name in trained_categories()]
+    if len(looks) % 2:
+        looks.append(np.zeros_like(looks[0]))
+    pairs = [np.concatenate(pair, axis=1) for pair in zip(looks[::2], looks[1::2], strict=True)]
+    return imageio.imwrite("<bytes>", np.concatenate(pairs), extension=".png")
 
 
 def perceived_scene(number: int, ids: tuple[str, ...]) -> np.ndarray:
