@@ -15,8 +15,17 @@ from artgym.errors import InvalidArgumentError
 from icaf4_policy.backbone.pointnet2 import FeaturePropagation, PointNet2, SetAbstraction
 
 
-def plain_features(backbone: nn.Module, points: Tensor, features: Tensor) -> Tensor:
+def plain_features(
+    backbone: nn.Module, points: Tensor, features: Tensor, *, first_of_equals: bool = False
+) -> Tensor:
     """What ``backbone(points, features)`` gives in evaluation mode: (B, N, width_out).
+
+    Args:
+        backbone: a ``PointNet2``.
+        points: (B, N, 3), network units.
+        features: (B, N, C).
+        first_of_equals: of neighbours that are equally far the first counts, as in ours, which
+            takes a slower sort; else it may be any.
 
     Raises:
         InvalidArgumentError: the backbone is another than ``PointNet2``.
@@ -27,17 +36,20 @@ def plain_features(backbone: nn.Module, points: Tensor, features: Tensor) -> Ten
             "features='color'."
         )
     return torch.stack(
-        [_of_cloud(backbone, xyz, own) for xyz, own in zip(points, features, strict=True)]
+        [
+            _of_cloud(backbone, xyz, own, first_of_equals)
+            for xyz, own in zip(points, features, strict=True)
+        ]
     )
 
 
-def _of_cloud(backbone: PointNet2, xyz0: Tensor, features: Tensor) -> Tensor:
+def _of_cloud(backbone: PointNet2, xyz0: Tensor, features: Tensor, first_of_equals: bool) -> Tensor:
     config = backbone.config
     x0 = torch.cat([xyz0, features], dim=-1)
     xyz1 = xyz0[_farthest_points(xyz0, config.centers[0])]
     xyz2 = xyz1[_farthest_points(xyz1, config.centers[1])]
-    near1 = _ball_query(xyz0, xyz1, config.radii[0], config.neighbors)
-    near2 = _ball_query(xyz1, xyz2, config.radii[1], config.neighbors)
+    near1 = _ball_query(xyz0, xyz1, config.radii[0], config.neighbors, first_of_equals)
+    near2 = _ball_query(xyz1, xyz2, config.radii[1], config.neighbors, first_of_equals)
     x1 = _abstracted(backbone.abstraction1, x0, xyz0, xyz1, near1)
     x2 = _abstracted(backbone.abstraction2, x1, xyz1, xyz2, near2)
     whole = F.relu(backbone.whole_norm1(backbone.whole1(torch.cat([x2, xyz2], dim=-1))))
@@ -59,10 +71,16 @@ def _farthest_points(points: Tensor, count: int) -> Tensor:
     return torch.stack(chosen)
 
 
-def _ball_query(points: Tensor, centers: Tensor, radius: float, count: int) -> Tensor:
+def _ball_query(
+    points: Tensor, centers: Tensor, radius: float, count: int, first_of_equals: bool
+) -> Tensor:
     """Indices (m, count) of the nearest points within ``radius``; the nearest fills up."""
     squares = (centers[:, None] - points[None]).square().sum(dim=-1)  # (m, n)
-    distance, found = squares.topk(min(count, len(points)), dim=-1, largest=False)
+    count = min(count, len(points))
+    if first_of_equals:
+        distance, found = (each[:, :count] for each in squares.sort(dim=-1, stable=True))
+    else:
+        distance, found = squares.topk(count, dim=-1, largest=False)
     return torch.where(distance <= radius**2, found, found[:, :1])
 
 

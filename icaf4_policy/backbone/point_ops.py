@@ -16,6 +16,10 @@ from torch import Tensor
 
 from artgym.errors import InvalidArgumentError
 
+#: Distances as plain float32 arithmetic gives them, without fused products: where two neighbours
+#: are all but equally far, their order is then the one that torch finds.
+_EXACT = {"nnan", "ninf", "nsz"}
+
 
 @numba.njit(cache=True, fastmath=True)
 def farthest_points(points: NDArray[np.float32], count: int) -> NDArray[np.int64]:
@@ -49,7 +53,7 @@ def farthest_points(points: NDArray[np.float32], count: int) -> NDArray[np.int64
     return chosen
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, fastmath=_EXACT)
 def ball_query(
     points: NDArray[np.float32], centers: NDArray[np.float32], radius: float, count: int
 ) -> NDArray[np.int64]:
@@ -92,7 +96,7 @@ def ball_query(
     return found
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, fastmath=_EXACT)
 def three_nearest(
     points: NDArray[np.float32], centers: NDArray[np.float32]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
