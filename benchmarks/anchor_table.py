@@ -34,7 +34,7 @@ from artgym.geometry.rotations import grasp_angle, matrix_from_quaternion
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import cell, run
 from benchmarks.grasp_heads import HeadKind, HeadTrainingConfig, train_heads
 from benchmarks.paper import TABLE_2
 from benchmarks.parallel import results_in_order
@@ -343,15 +343,10 @@ def table_of(category: str, result: Mapping[str, Any], anchors: Mapping[str, Any
         table.add_row(
             name,
             *(("", "", "") if spacing is None else map(str, spacing.values())),
-            *(_cell(row[key], decimals) for key, decimals in _PRINTED.items()),
+            *(cell(row[key], decimals) for key, decimals in _PRINTED.items()),
             *(("", "") if paper is None else map(str, paper)),
         )
     return table
-
-
-def _cell(value: float, decimals: int) -> str:
-    """A number; a dash where there is none."""
-    return "-" if value != value else f"{value:.{decimals}f}"
 
 
 def report(config: AnchorTableConfig) -> list[Table]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -87,3 +88,8 @@ def run_named(
         print(f"{name}: {UnknownNameError(what, word, choices)}", file=sys.stderr)
         return 2
     return choices[arguments[0]](arguments[1:])
+
+
+def cell(value: float | None, decimals: int) -> str:
+    """A number in a table; a dash where there is none."""
+    return "-" if value is None or math.isnan(value) else f"{value:.{decimals}f}"

@@ -5,7 +5,6 @@ Run ``python -m benchmarks.perception table1 --help``.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -21,11 +20,11 @@ from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
 from benchmarks.baselines import BaselinesConfig, train_baselines
-from benchmarks.command import run
-from benchmarks.paper import TABLE_1
+from benchmarks.command import cell, run
+from benchmarks.paper import METHOD_LABELS, TABLE_1
 from benchmarks.parallel import results_in_order
 from benchmarks.policies import load_perception
-from benchmarks.views import METHODS, ViewsTask, score_views
+from benchmarks.views import ViewsTask, score_views
 from icaf4_policy.metrics import CHANCE_ROWS, COVERAGE_DEG, PRECISION_DEG, mean_rows
 from icaf4_policy.shipped import trained_categories
 
@@ -126,7 +125,7 @@ class ObjectTableConfig:
         """The folder of each method's weights for a category; None for the shipped ones."""
         folders = {"icaf4": self.weights and self.weights.absolute()}
         if self.work and category in self.baselines:
-            folders |= {m: self.work.absolute() / m for m in METHODS if m not in folders}
+            folders |= {m: self.work.absolute() / m for m in METHOD_LABELS if m not in folders}
         return folders
 
 
@@ -229,7 +228,7 @@ def category_table(category: str, result: Mapping[str, Any]) -> Table:
     for _, heading, _ in _COLUMNS:
         table.add_column(heading, justify="right")
     for method, values in result["metrics"][category].items():
-        table.add_row(METHODS[method].label, *_cells(values))
+        table.add_row(METHOD_LABELS[method], *_cells(values))
         paper = result["paper"][method].get(category)
         if paper:
             # The paper's translations are in another unit.
@@ -248,12 +247,7 @@ def category_table(category: str, result: Mapping[str, Any]) -> Table:
 
 
 def _cells(values: Mapping[str, float]) -> list[str]:
-    return [_cell(values.get(name), decimals) for name, _, decimals in _COLUMNS]
-
-
-def _cell(value: float | None, decimals: int) -> str:
-    """A number; a dash where there is none."""
-    return "-" if value is None or math.isnan(value) else f"{value:.{decimals}f}"
+    return [cell(values.get(name), decimals) for name, _, decimals in _COLUMNS]
 
 
 def grasp_table(metrics: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
@@ -271,7 +265,7 @@ def grasp_table(metrics: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Tab
         for prefix, points in (("grasp", "graspable, called so"), ("grasp_calls", "all calls")):
             for source in ("network", *CHANCE_ROWS):
                 row = {key: values.get(f"{prefix}/{source}/{key}") for key in keys}
-                cells = [_cell(value, 1 if key == "error_deg" else 3) for key, value in row.items()]
+                cells = [cell(value, 1 if key == "error_deg" else 3) for key, value in row.items()]
                 table.add_row(category, points, source, *cells)
     return table
 

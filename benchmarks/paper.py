@@ -8,6 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+#: The methods of Table 1, as they are printed.
+METHOD_LABELS: Mapping[str, str] = {
+    "icaf4": "ICAF-4",
+    "ah_where": "AH-Where",
+    "daisy": "DAISY",
+    "fpfh": "FPFH",
+}
+
 #: Columns of Table 1, by the names that the metrics have here.
 _TABLE_1_COLUMNS = (
     "part_miou",

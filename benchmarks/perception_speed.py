@@ -115,11 +115,10 @@ def _backbone_row(
     rng = np.random.default_rng(config.seed)
     backbone = perception.model.backbone
     inputs = [_network_input(perception, sample, rng) for sample in samples]
+    plains = [plain_features(backbone, *given, first_of_equals=True) for given in inputs]
     difference = max(
-        float(
-            (backbone(*given) - plain_features(backbone, *given, first_of_equals=True)).abs().max()
-        )
-        for given in inputs
+        float((backbone(*given) - plain).abs().max())
+        for given, plain in zip(inputs, plains, strict=True)
     )
 
     def ours(i: int) -> tuple[float]:

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from artgym.errors import DamagedFileError, InvalidArgumentError
+from benchmarks.command import cell
+from benchmarks.paper import METHOD_LABELS
 from benchmarks.record import RESULTS_FOLDER
 
 ROOT = Path(__file__).parent.parent
@@ -86,9 +88,6 @@ _OBJECT_COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("best grasp succeeds", "executed", "{:.2f}"),
 )
 
-#: Names of methods in the paper's Table 1.
-_METHOD_LABELS = {"icaf4": "", "ah_where": "AH-Where", "daisy": "DAISY", "fpfh": "FPFH"}
-
 
 def object_table_block(result: Mapping[str, Any]) -> str:
     """A Markdown table of ``object_table.json``: a category and method a line, the paper's too."""
@@ -104,7 +103,7 @@ def object_table_block(result: Mapping[str, Any]) -> str:
 
     for category, methods in result["metrics"].items():
         for method, values in methods.items():
-            name = f"{category} {_METHOD_LABELS[method]}".strip()
+            name = category if method == "icaf4" else f"{category}, {METHOD_LABELS[method]}"
             lines.append(line(name, values))
             paper = result["paper"].get(method, {}).get(category)
             if paper:
@@ -294,7 +293,7 @@ def label_speed_block(result: Mapping[str, Any]) -> str:
             f"| {category} | {row['verdicts_a_second_one_core']:,.0f} "
             f"| {100 * row['decided_by_filter']:.1f} % | {100 * early:.0f} % "
             f"| {agreed['compared']:,} | {100 * agreed['agreement']:.2f} % "
-            f"| {_number(agreed['kappa'], 3)} |"
+            f"| {cell(agreed['kappa'], 3)} |"
         )
     workers = result["config"]["workers"]
     lines += [
@@ -408,13 +407,13 @@ def anchor_table_block(result: Mapping[str, Any]) -> str:
             row = {**category["rows"], **category["chance"]}[name]
             _, paper = category["paper"].get(name, (None, None))
             cells += [
-                _number(row["error_deg"], 1),
-                _number(row["coverage@15"], 2),
+                cell(row["error_deg"], 1),
+                cell(row["coverage@15"], 2),
                 "" if paper is None else f"{paper:g}",
             ]
         lines.append(_line(cells))
     affordance = ", ".join(
-        f"{c} {_number(row['affordance_miou'], 3)}" for c, row in categories.items()
+        f"{c} {cell(row['affordance_miou'], 3)}" for c, row in categories.items()
     )
     judged = sum(row["judged"] for row in categories.values())
     lines += [
@@ -426,11 +425,6 @@ def anchor_table_block(result: Mapping[str, Any]) -> str:
         f"mIoU, is the same in all rows: {affordance}.",
     ]
     return "\n".join(lines)
-
-
-def _number(value: float | None, decimals: int) -> str:
-    """A dash for what could not be measured."""
-    return "-" if value is None else f"{value:.{decimals}f}"
 
 
 BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {

@@ -18,13 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from artgym.annotation.annotate import labelled_ids
 from artgym.datasets.generate import GenerationConfig, make_scenes
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, Picture, Sample
 from artgym.datasets.sets import SETS
 from artgym.errors import InvalidArgumentError
-from artgym.geometry.camera import project
+from artgym.geometry.camera import points_from_depth, project
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
@@ -326,9 +327,6 @@ def _grasp_error(
 
     Infinite where nothing succeeded at that point, or no proposal is at a labelled one.
     """
-    from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
-
-    from artgym.geometry.camera import points_from_depth
     from icaf4_policy.metrics import grasp_distances
 
     mask = seen.part_mask > 0

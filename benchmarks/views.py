@@ -24,29 +24,11 @@ if TYPE_CHECKING:
     from icaf4_policy.pose_fitting import PoseFit
 
 
-@dataclass(frozen=True, kw_only=True)
-class Method:
-    """A row of the paper's Table 1.
+#: The one method whose parts are fitted by the joint-constrained optimizer, and without a pose of
+#: the object; what else tells the methods apart stands in their weights.
+_OPTIMIZED = "ah_where"
 
-    Attributes:
-        label: as it is printed.
-        optimizer: whether parts are fitted by the joint-constrained optimizer; there is no pose of
-            the object then.
-    """
-
-    label: str
-    optimizer: bool = False
-
-
-#: The rows; each has weights of its own, which say what they read and how they propose grasps.
-METHODS: Mapping[str, Method] = {
-    "icaf4": Method(label="ICAF-4"),
-    "ah_where": Method(label="AH-Where", optimizer=True),
-    "daisy": Method(label="DAISY"),
-    "fpfh": Method(label="FPFH"),
-}
-
-#: Of the optimizer: it takes a second or so a view.
+#: It takes a second or so a view.
 _OPTIMIZER = ConstrainedFitConfig(hypotheses=50)
 
 
@@ -60,8 +42,8 @@ class ViewsTask:
         views: pictures of each labelled joint state.
         seed: of the views, the choice of points and the chance rows.
         label_root: folder of labels; None for the shipped ones.
-        methods: of ``METHODS``, the folder with ``{category}.safetensors`` of each; None for the
-            shipped weights.
+        methods: of ``paper.METHOD_LABELS``, the folder with ``{category}.safetensors`` of each;
+            None for the shipped weights.
     """
 
     category: str
@@ -82,7 +64,7 @@ def score_views(task: ViewsTask) -> dict[str, list[dict[str, float]]]:
     pictures = make_pictures(task.object_id, config, task.label_root)
     return {
         method: [
-            _score(load_perception(task.category, weights), picture, METHODS[method], task, number)
+            _score(load_perception(task.category, weights), picture, method, task, number)
             for number, picture in enumerate(pictures)
         ]
         for method, weights in task.methods.items()
@@ -90,7 +72,7 @@ def score_views(task: ViewsTask) -> dict[str, list[dict[str, float]]]:
 
 
 def _score(
-    perception: Any, picture: Picture, method: Method, task: ViewsTask, number: int
+    perception: Any, picture: Picture, method: str, task: ViewsTask, number: int
 ) -> dict[str, float]:
     from icaf4_policy.backbone.classical import described
     from icaf4_policy.evaluation import evaluate_sample
@@ -98,7 +80,7 @@ def _score(
     rng = np.random.default_rng([task.seed, zlib.crc32(task.object_id.encode()), number])
     (sample,) = picture.samples
     sample = described(picture, sample, perception.model.config.features)
-    refit = (lambda prediction: _optimized(prediction, rng)) if method.optimizer else None
+    refit = (lambda prediction: _optimized(prediction, rng)) if method == _OPTIMIZED else None
     row, prediction = evaluate_sample(perception, sample, rng, refit=refit)
     for name in ("part_translation", "object_translation", "joint_pivot"):
         metres = row.get(f"{name}_m", float("nan"))

@@ -14,8 +14,8 @@ from artgym.datasets.sets import SETS
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from benchmarks import perception
 from benchmarks.object_table import MEAN, ObjectTableConfig, _means, tables_from_result
-from benchmarks.paper import TABLE_1
-from benchmarks.views import METHODS, _optimized
+from benchmarks.paper import METHOD_LABELS, TABLE_1
+from benchmarks.views import _optimized
 from icaf4_policy.evaluation import true_part_boxes
 from icaf4_policy.inference import JointEstimate, Perception
 from icaf4_policy.metrics import pose_errors
@@ -24,7 +24,7 @@ from tests.icaf4_policy.toy import toy_network, toy_sample
 
 
 def test_the_paper_has_a_row_for_every_method_and_category():
-    assert set(TABLE_1) == set(METHODS)
+    assert set(TABLE_1) == set(METHOD_LABELS)
     for rows in TABLE_1.values():
         assert set(rows) == set(SETS["artimage"])
 
@@ -54,7 +54,7 @@ def test_baselines_need_data_and_a_place():
     with pytest.raises(InvalidArgumentError, match="data=data and work=None"):
         ObjectTableConfig(data=Path("data"))
     config = ObjectTableConfig(data=Path("data"), work=Path("work"))
-    assert set(config.weights_of("laptop")) == set(METHODS)
+    assert set(config.weights_of("laptop")) == set(METHOD_LABELS)
     assert set(config.weights_of("box")) == {"icaf4"}
 
 

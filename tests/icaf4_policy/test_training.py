@@ -141,13 +141,17 @@ def test_a_gpu_learns_the_same(tmp_path, samples):
     np.testing.assert_allclose(losses[1], losses[0], rtol=0.05)
 
 
+def write_splits(folder, parts):
+    """Pictures to train with and to choose by, as sets in a folder."""
+    for split, part in zip(("train", "val"), parts, strict=True):
+        write_pictures(folder / split / "0000.h5", part)
+        shard = ShardEntry.of(folder / split / "0000.h5", len(part))
+        Manifest(config={}, planned=1, shards=(shard,)).write(folder / split)
+
+
 def test_train_command(tmp_path, samples, capsys):
-    for split, part in zip(("train", "val"), samples, strict=True):
-        folder = tmp_path / "data" / "toy" / split
-        pictures = [toy_picture(int(sample.object_id[-4:])) for sample in part]
-        write_pictures(folder / "0000.h5", pictures)
-        shard = ShardEntry.of(folder / "0000.h5", len(part))
-        Manifest(config={}, planned=1, shards=(shard,)).write(folder)
+    pictures = [[toy_picture(int(sample.object_id[-4:])) for sample in part] for part in samples]
+    write_splits(tmp_path / "data" / "toy", pictures)
     weights = tmp_path / "weights" / "toy.safetensors"
     arguments = ["train", "--category", "toy", "--data", str(tmp_path / "data")]
     arguments += ["--out", str(weights), "--epochs", "1", "--num-points", "512"]
@@ -162,14 +166,8 @@ def test_train_command(tmp_path, samples, capsys):
 
 
 def test_scenes_add_their_objects_of_the_category(tmp_path, samples, capsys):
-    def written(folder, parts):
-        for split, part in zip(("train", "val"), parts, strict=True):
-            write_pictures(folder / split / "0000.h5", part)
-            shard = ShardEntry.of(folder / split / "0000.h5", len(part))
-            Manifest(config={}, planned=1, shards=(shard,)).write(folder / split)
-
     pictures = [[toy_picture(i) for i in part] for part in ((0, 1, 2), (3,))]
-    written(tmp_path / "data" / "toy", pictures)
+    write_splits(tmp_path / "data" / "toy", pictures)
     strange = [
         [
             dataclasses.replace(
@@ -180,7 +178,7 @@ def test_scenes_add_their_objects_of_the_category(tmp_path, samples, capsys):
         ]
         for part in pictures
     ]
-    written(tmp_path / "scenes", strange)
+    write_splits(tmp_path / "scenes", strange)
     weights = tmp_path / "toy.safetensors"
     arguments = ["train", "--category", "toy", "--data", str(tmp_path / "data")]
     arguments += ["--scenes", str(tmp_path / "scenes"), "--out", str(weights), "--epochs", "1"]
