@@ -64,7 +64,7 @@ _DRAWS = 20
 _T_TCP_HAND = transforms.invert(T_hand_tcp)
 _PRETTY_SIZE = (480, 360)
 _UNTOUCHED = PartContact(touched=False, pinched=False)
-_REPORTED = tuple((f"{100 * travel:.0f}", travel) for travel in REPORTED_TRAVELS)
+_REPORTED = tuple(f"{100 * travel:.0f}" for travel in REPORTED_TRAVELS)
 
 
 class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
@@ -299,7 +299,7 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._progress = Progress.begin(start_fraction)
         # How far it would be to the end of the range.
         self._way = 1.0 - start_fraction if self.direction > 0 else start_fraction
-        self._succeeded_once = False
+        self._succeeds = self._succeeded_once = False
         self._actions: list[list[float]] = []
         self._over, self._blown_up = "", False
         self._look()
@@ -344,14 +344,14 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         self._grip_point = self._observer.grip_point(reading)
         contact = scene.contact(self.target_part)
         self._progress = self._progress.advance(fraction, contact.touched, contact.pinched)
-        self._succeeded_once |= self._progress.success
+        self._succeeds = bool(self._progress.success)
+        self._succeeded_once |= self._succeeds
         return contact
 
     def _end(self) -> tuple[bool, bool]:
         """Whether the episode is terminated, and whether it is truncated; then it is over."""
         terminated = bool(
-            self._progress.success
-            and self._progress.headway(self.direction) >= DONE_SHARE * self._way
+            self._succeeds and self._progress.headway(self.direction) >= DONE_SHARE * self._way
         )
         truncated = len(self._actions) >= self.horizon
         if terminated or truncated:
@@ -549,12 +549,13 @@ class ArticulatedEnv(gymnasium.Env[Any, NDArray[np.float32]], EzPickle):
         progress = self._progress
         speed = self._reading.velocities[self.target_part - 1]
         distance = math.dist(self._grip_point, self._reading.tcp_position)
+        reached = map(bool, progress.successes_at(REPORTED_TRAVELS))
         self._last_info = info = {
             "object_id": self._object.object_id,
-            "success": bool(progress.success),
+            "success": self._succeeds,
             "success_gripped": bool(progress.success_gripped),
-            "success_once": bool(self._succeeded_once),
-            "success_at": {name: bool(progress.success_at(t)) for name, t in _REPORTED},
+            "success_once": self._succeeded_once,
+            "success_at": dict(zip(_REPORTED, reached, strict=True)),
             "success_maniskill": maniskill_success(progress, speed),
             "success_where2act": where2act_success(progress, self._joint.range),
             "travel": progress.travel,

@@ -229,29 +229,28 @@ class Observer:
     ) -> NDArray[np.float32]:
         """The fields of ``STATE_FIELDS`` one after another."""
         tcp, turn = reading.tcp_position, reading.hand_quaternion
-        return np.array(
-            (
-                *tcp,
-                *quaternions.x_axis(turn),
-                *quaternions.z_axis(turn),
-                *reading.linear_velocity,
-                *reading.angular_velocity,
-                reading.jaw_width,
-                open_fraction,
-                reading.velocities[self._part - 1],
-                *self._joint,
-                *grip_point,
-                grip_point[0] - tcp[0],
-                grip_point[1] - tcp[1],
-                grip_point[2] - tcp[2],
-                *quaternions.x_axis(reading.part_quaternion),
-                *quaternions.z_axis(reading.part_quaternion),
-                *self._sizes,
-                *reading.arm_positions,
-                *reading.arm_velocities,
-            ),
-            dtype=np.float32,
+        numbers = (
+            *tcp,
+            *quaternions.x_axis(turn),
+            *quaternions.z_axis(turn),
+            *reading.linear_velocity,
+            *reading.angular_velocity,
+            reading.jaw_width,
+            open_fraction,
+            reading.velocities[self._part - 1],
+            *self._joint,
+            *grip_point,
+            grip_point[0] - tcp[0],
+            grip_point[1] - tcp[1],
+            grip_point[2] - tcp[2],
+            *quaternions.x_axis(reading.part_quaternion),
+            *quaternions.z_axis(reading.part_quaternion),
+            *self._sizes,
+            *reading.arm_positions,
+            *reading.arm_velocities,
         )
+        # Faster than np.array, which looks at each number twice.
+        return np.fromiter(numbers, np.float32, len(numbers))
 
     def _fields(self, vector: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
         sizes = STATE_FIELDS[self.config.robot]

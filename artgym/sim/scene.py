@@ -124,6 +124,9 @@ class Reading(NamedTuple):
             *self.arm_velocities,
         )
         places = (*self.tcp_position, *self.part_position)
+        if math.hypot(*speeds) < fastest and math.hypot(*places) < farthest:
+            # What is true of all together is true of each, and never of NaN.
+            return math.isfinite(sum(self.q))
         return (
             -fastest < min(speeds)
             and max(speeds) < fastest
@@ -205,13 +208,15 @@ class ArticulatedBody:
     def resist(self) -> None:
         """Applies the joints' damping, and nothing else, during the coming step."""
         velocities = self._articulation.qvel
-        still = max(map(abs, velocities.tolist()), default=0.0) < STILL
-        if not still:
-            self._articulation.qf = self._resistance * velocities
-        elif not self._rests:
+        for speed in velocities.tolist():
+            if not -STILL < speed < STILL:
+                self._articulation.qf = self._resistance * velocities
+                self._rests = False
+                return
+        if not self._rests:
+            # Once only: an effort, even of nothing, would keep awake what could sleep.
             self._articulation.qf = np.zeros(len(velocities))
-        # An effort, even of nothing, would keep awake what could sleep.
-        self._rests = still
+            self._rests = True
 
     def link_poses(self) -> Array:
         """``Ts_world_link`` (K, 4, 4)."""

@@ -11,6 +11,7 @@ Everything is arithmetic on scalars, numpy arrays or torch tensors alike.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 #: Least travel of a success, as a share of the joint's range.
@@ -76,9 +77,14 @@ class Progress(NamedTuple):
         """Share of the motion made with the part between the fingers; 0 before any motion."""
         return self.gripped_path / (self.path + _EPSILON)
 
+    def successes_at(self, travels: Sequence[float]) -> list[Any]:
+        """Success with other thresholds on the travel, one each."""
+        here, is_engaged = self.travel, self.engaged >= SHARE_THRESHOLD
+        return [(here >= travel) & is_engaged for travel in travels]
+
     def success_at(self, travel: float) -> Any:
         """Success with another threshold on the travel."""
-        return (self.travel >= travel) & (self.engaged >= SHARE_THRESHOLD)
+        return self.successes_at((travel,))[0]
 
     @property
     def success(self) -> Any:
