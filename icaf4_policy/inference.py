@@ -365,6 +365,7 @@ class Perception:
                     part_probability[on_part, k],
                 )
             )
+        up_camera = R_level_camera[2] if self.model.config.upright else None
         return Prediction(
             points_camera=points,
             point_index=pick,
@@ -373,8 +374,8 @@ class Perception:
             npcs=npcs,
             naocs=naocs,
             affordance=affordance,
-            part_boxes=self._boxes(npcs, points, part, joints, rng),
-            object_boxes=self._boxes(naocs, points, part, joints, rng),
+            part_boxes=self._boxes(npcs, points, part, joints, up_camera, rng),
+            object_boxes=self._boxes(naocs, points, part, joints, up_camera, rng),
             joints=tuple(joints),
             grasps=self._ranked_grasps(
                 outputs, points, part, affordance, R_level_camera, table_camera
@@ -388,6 +389,7 @@ class Perception:
         points: Array,
         part: NDArray[np.int64],
         joints: Sequence[JointEstimate],
+        up_camera: Array | None,
         rng: np.random.Generator,
     ) -> tuple[PoseFit | None, ...]:
         """One box a part, ``None`` where it was not found."""
@@ -406,6 +408,7 @@ class Perception:
             [joint.joint_type for joint in joints],
             [joint.axis_camera for joint in joints],
             self.consistency,
+            up_camera=up_camera,
         )
 
     def _ranked_grasps(

@@ -1,15 +1,16 @@
-"""Turns the fitted boxes of an object's parts until they agree with the joints between them.
+"""Turns the fitted boxes of an object's parts until they agree with what links them.
 
 The frames of a part and of the base differ by the motion of the joint alone: they have the same
-axes after a slide, and after a turn share the joint's axis. Fits from each part's own points miss
-that by their errors, so that what one part is surer of helps the others. Taken are the small turns
-that are most probable, given how sure each fit is of each direction and the network of the axis:
-one linear update, as of a Kalman filter.
+axes after a slide, and after a turn share the joint's axis. The base of an object that stands
+upright has its z axis along the vertical. Fits from each part's own points miss that by their
+errors, so that what one part is surer of helps the others. Taken are the turns that are most
+probable, given how sure each fit is of each direction, the network of the axis, and who looks of
+the vertical: the update of an iterated Kalman filter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,10 @@ Array = NDArray[np.floating]
 
 #: Standard deviation of the turn that a joint itself leaves to chance, radians.
 _EXACT = 1e-6
+#: How often the turns are worked out, each time about those of before.
+_ITERATIONS = 3
+#: The link of an upright base to the world, beside the codes of ``Sample.joint_type``.
+_UPRIGHT = 2
 #: A fit without error may have so much after it was computed anew, in normalised units.
 _ROUNDING = 1e-9
 #: Points on one line still have so much of an arm for turns about it, in normalised units.
@@ -39,19 +44,23 @@ class ConsistencyConfig:
         independent: points of a part that err independently; a network's errors at
             neighbouring points are alike, so that more points do not make a fit surer.
         axis_error: radians, standard deviation of a predicted axis in each direction.
-        worse: a part's fit may have its root-mean-square error grow by this share; a joint that
+        tilt: radians, standard deviation, in each direction, of an upright base's z axis from
+            where the vertical is taken to be.
+        worse: a part's fit may have its root-mean-square error grow by this share; a link that
             asks for more is left out. Points on a flat part hardly tell its depth from a turn, so
             that a fit that is better by half can still be the wrong one.
     """
 
     independent: float = 30.0
     axis_error: float = float(np.radians(6.0))
+    tilt: float = float(np.radians(1.0))
     worse: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (self.independent > 0 and self.axis_error >= 0 and self.worse >= 0):
+        errors = (self.axis_error, self.tilt, self.worse)
+        if not (self.independent > 0 and all(error >= 0 for error in errors)):
             raise InvalidArgumentError(
-                f"independent={self.independent}, axis_error={self.axis_error}, "
+                f"independent={self.independent}, axis_error={self.axis_error}, tilt={self.tilt}, "
                 f"worse={self.worse}: expected the first above 0, the others at least 0."
             )
 
@@ -63,8 +72,10 @@ def consistent_fits(
     joint_types: Sequence[int],
     axes_camera: ArrayLike,
     config: ConsistencyConfig = ConsistencyConfig(),
+    *,
+    up_camera: ArrayLike | None = None,
 ) -> tuple[PoseFit | None, ...]:
-    """The fits of K parts (base = 0), made to agree with the joints that link them to the base.
+    """The fits of K parts (base = 0), made to agree with the joints and with the vertical.
 
     Args:
         fits: of each part; ``None`` where it was not found.
@@ -72,16 +83,17 @@ def consistent_fits(
         points_camera: of each part, (n, 3), metres.
         joint_types: (K,), codes of ``Sample.joint_type``.
         axes_camera: (K, 3), unit axes.
-        config: how sure fits and axes are.
+        config: how sure fits, axes and the vertical are.
+        up_camera: (3,), unit: where the z axis of the base points, if the object stands upright.
 
     Returns:
-        The fits, turned, with the size and position that suit the turned box best. A joint that
+        The fits, turned, with the size and position that suit the turned box best. A link that
         fits contradict has no effect; a fit without error stays.
 
     Raises:
         InvalidArgumentError: not all are of K parts.
     """
-    axes = np.asarray(axes_camera, dtype=float).reshape(-1, 3)
+    axes = np.array(axes_camera, dtype=float).reshape(-1, 3)
     counts = [len(a) for a in (fits, nocs, points_camera, joint_types, axes)]
     if len(set(counts)) != 1:
         raise InvalidArgumentError(
@@ -93,18 +105,21 @@ def consistent_fits(
         for k, (fit, x, y) in enumerate(zip(fits, nocs, points_camera, strict=True))
         if fit is not None and (part := _Part.of(fit, np.asarray(x) - 0.5, np.asarray(y)))
     }
-    joints = [k for k in parts if k > 0 and joint_types[k] != JOINT_NONE]
-    while 0 in parts and joints:
-        linked = [parts[k] for k in (0, *joints)]
-        turns, surprise = _small_turns(
-            linked, [joint_types[k] for k in joints], axes[joints], config
-        )
-        turned = [p.turned(R) for p, R in zip(linked, matrix_from_axis_angle(turns), strict=True)]
-        limits = [(1.0 + config.worse) * part.error + _ROUNDING for part in linked]
-        if all(error <= limit for (_, error), limit in zip(turned, limits, strict=True)):
-            new = {k: fit for k, (fit, _) in zip((0, *joints), turned, strict=True)}
-            return tuple(new.get(k, fit) for k, fit in enumerate(fits))
-        joints.pop(int(np.argmax(surprise)))
+    links = {k: joint_types[k] for k in parts if k > 0 and joint_types[k] != JOINT_NONE}
+    if up_camera is not None:
+        # Stands first: the base's own link, to the world.
+        links = {0: _UPRIGHT, **links}
+        axes[0] = up_camera
+    while 0 in parts and links:
+        linked = sorted({0, *links})
+        turns, surprise = _most_probable_turns({k: parts[k] for k in linked}, links, axes, config)
+        turned = {k: parts[k].turned(R) for k, R in turns.items()}
+        if all(
+            error <= (1.0 + config.worse) * parts[k].error + _ROUNDING
+            for k, (_, error) in turned.items()
+        ):
+            return tuple(turned[k][0] if k in turned else fit for k, fit in enumerate(fits))
+        del links[max(surprise, key=surprise.__getitem__)]
     return tuple(fits)
 
 
@@ -166,41 +181,76 @@ def _squared_errors(fit: PoseFit, nocs: Array, points: Array) -> Array:
     return (((points - center) @ (R / fit.scale) - nocs) ** 2).sum(axis=-1)
 
 
-def _small_turns(
-    parts: Sequence[_Part], joint_types: Sequence[int], axes: Array, config: ConsistencyConfig
-) -> tuple[Array, Array]:
-    """The turns that make base and J parts agree.
+def _most_probable_turns(
+    parts: Mapping[int, _Part], links: Mapping[int, int], axes: Array, config: ConsistencyConfig
+) -> tuple[dict[int, Array], dict[int, float]]:
+    """The turns that make linked parts agree.
 
     Returns:
-        Their rotation vectors (J + 1, 3), camera frame, and how far each joint (J,) is from what
-        the fits say, in variances.
+        Rotations (3, 3) in the camera frame by part, and by link how far it is from what the fits
+        say, in variances.
     """
-    count = len(parts)
-    covariance = np.zeros((3 * count, 3 * count))
-    for k, part in enumerate(parts):
-        covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = part.covariance(config.independent)
-    R_camera_base = parts[0].fit.T_camera_box[:3, :3]
-    # Of the base's and the parts' turns, H makes how far each joint is off: a miss, that is noise.
-    rows, misses, noise, of_joint = [], [], [], []
-    for k, (joint_type, axis) in enumerate(zip(joint_types, axes, strict=True), start=1):
-        R_relative = parts[k].fit.T_camera_box[:3, :3] @ R_camera_base.T
-        R_motion, across, spread = np.eye(3), np.eye(3), 0.0
-        if joint_type == JOINT_REVOLUTE:
-            # The turn about the axis that comes nearest; what is left is across the axis.
-            skewed = R_relative - R_relative.T
-            sine = axis @ [skewed[2, 1], skewed[0, 2], skewed[1, 0]]
-            q = np.arctan2(sine, np.trace(R_relative) - axis @ R_relative @ axis)
-            R_motion = matrix_from_axis_angle(q * axis)
-            across = frame_from_z(axis)[:, :2].T
-            spread = 2.0 * np.sin(q / 2.0) * config.axis_error
-        row = np.zeros((len(across), 3 * count))
-        row[:, 3 * k : 3 * k + 3], row[:, :3] = across, -across @ R_motion
-        rows.append(row)
-        misses.append(across @ axis_angle_from_matrix(R_relative @ R_motion.T))
-        noise += [spread**2 + _EXACT**2] * len(across)
-        of_joint += [k - 1] * len(across)
-    H, miss = np.concatenate(rows), np.concatenate(misses)
-    innovation = H @ covariance @ H.T + np.diag(noise)
-    solved = np.linalg.solve(innovation, miss)
-    surprise: Array = np.bincount(of_joint, miss**2 / np.diag(innovation)).astype(float)
-    return -(covariance @ H.T @ solved).reshape(count, 3), surprise
+    place = {k: slice(3 * i, 3 * i + 3) for i, k in enumerate(parts)}
+    covariance = np.zeros((3 * len(parts), 3 * len(parts)))
+    for k, part in parts.items():
+        covariance[place[k], place[k]] = part.covariance(config.independent)
+    turns = np.zeros(3 * len(parts))
+    surprise: dict[int, float] = {}
+    for _ in range(_ITERATIONS):
+        R_turns = {k: matrix_from_axis_angle(turns[at]) for k, at in place.items()}
+        R_camera = {k: R_turns[k] @ part.fit.T_camera_box[:3, :3] for k, part in parts.items()}
+        # Of the parts' turns, H makes how far each link is off: a miss, that is noise.
+        rows, misses, noise = [], [], []
+        for k, link in links.items():
+            row, miss, spread = _linearised(k, link, axes[k], R_camera, place, config)
+            rows.append(row)
+            misses.append(miss)
+            noise += [spread**2] * len(miss)
+        H, miss = np.concatenate(rows), np.concatenate(misses)
+        innovation = H @ covariance @ H.T + np.diag(noise)
+        if not surprise:
+            ends = np.cumsum([len(each) for each in misses])[:-1]
+            squares = np.split(miss**2 / np.diag(innovation), ends)
+            surprise = {k: float(part.sum()) for k, part in zip(links, squares, strict=True)}
+        turns = -covariance @ H.T @ np.linalg.solve(innovation, miss - H @ turns)
+    return {k: matrix_from_axis_angle(turns[at]) for k, at in place.items()}, surprise
+
+
+def _linearised(
+    k: int,
+    link: int,
+    axis: Array,
+    R_camera: Mapping[int, Array],
+    place: Mapping[int, slice],
+    config: ConsistencyConfig,
+) -> tuple[Array, Array, float]:
+    """How part k's link is off, and what small turns of the parts change of it.
+
+    Returns:
+        Rows (m, 3 K) over the parts' turns, the miss (m,), and its standard deviation, radians.
+    """
+    count = 3 * len(place)
+    if link == _UPRIGHT:
+        z = R_camera[k][:, 2]
+        across = frame_from_z(z)[:, :2].T
+        row = np.zeros((2, count))
+        row[:, place[k]] = across
+        # The turn from the vertical to where the base has it.
+        turn = np.cross(axis, z)
+        sine = np.linalg.norm(turn)
+        angle = np.arctan2(sine, axis @ z)
+        return row, across @ turn * (angle / max(sine, _EXACT)), config.tilt
+    R_relative = R_camera[k] @ R_camera[0].T
+    R_motion, across, spread = np.eye(3), np.eye(3), 0.0
+    if link == JOINT_REVOLUTE:
+        # The turn about the axis that comes nearest; what is left is across the axis.
+        skewed = R_relative - R_relative.T
+        sine = axis @ [skewed[2, 1], skewed[0, 2], skewed[1, 0]]
+        q = np.arctan2(sine, np.trace(R_relative) - axis @ R_relative @ axis)
+        R_motion = matrix_from_axis_angle(q * axis)
+        across = frame_from_z(axis)[:, :2].T
+        spread = 2.0 * np.sin(q / 2.0) * config.axis_error
+    row = np.zeros((len(across), count))
+    row[:, place[k]], row[:, place[0]] = across, -across @ R_motion
+    miss = across @ axis_angle_from_matrix(R_relative @ R_motion.T)
+    return row, miss, float(np.hypot(spread, _EXACT))

@@ -41,6 +41,8 @@ class ModelConfig:
         backbone: sizes of the backbone.
         features: what is given of each point beside where it is; descriptors go to the heads
             through a layer of ``backbone.width_out`` features, without PointNet++.
+        upright: whether the base's z axis points up in all that it was trained with, so that fitted
+            boxes are made to stand as well.
     """
 
     categories: tuple[str, ...]
@@ -51,6 +53,7 @@ class ModelConfig:
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
     features: Features = "color"
+    upright: bool = False
 
     def __post_init__(self) -> None:
         if self.num_parts < 1:

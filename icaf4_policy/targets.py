@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -42,6 +43,7 @@ class Targets:
             ``match_start[g]:match_start[g + 1]`` of the next two.
         match_anchor: int16 (n,), matched anchors (the mask M of Eq. 3, sparse).
         match_residual: float16 (n, r), from the anchor to its nearest successful grasp (Eq. 4).
+        tilt: radians, from the vertical to the z axis of the base; infinite where not known.
     """
 
     category: int
@@ -58,6 +60,7 @@ class Targets:
     match_start: NDArray[np.int32]
     match_anchor: NDArray[np.int16]
     match_residual: NDArray[np.float16]
+    tilt: float = math.inf
 
 
 def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
@@ -150,6 +153,7 @@ def targets_from_sample(
         match_start=np.searchsorted(row, np.arange(len(sample.grasp_part) + 1)).astype(np.int32),
         match_anchor=matched.astype(np.int16),
         match_residual=residual.astype(np.float16),
+        tilt=math.acos(min(1.0, float(R_level_camera[2] @ sample.T_camera_object[:3, 2]))),
     )
 
 

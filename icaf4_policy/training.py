@@ -32,6 +32,9 @@ from icaf4_policy.targets import (
 )
 from icaf4_policy.training_run import TrainingRun, cosine_rate, keep_freed_memory
 
+#: A base whose z axis is nearer to the vertical stands upright, radians.
+UPRIGHT = math.radians(1.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingConfig:
@@ -172,6 +175,7 @@ def _model_config(config: TrainingConfig, targets: Sequence[Targets]) -> ModelCo
         anchors=config.anchors,
         features=config.features,
         scale=config.scale,
+        upright=all(t.tilt < UPRIGHT for t in targets),
     )
 
 

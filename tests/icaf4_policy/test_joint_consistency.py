@@ -106,6 +106,42 @@ def test_parts_without_fit_or_joint_are_passed_through():
     assert consistent_fits(fits, nocs, points, [JOINT_NONE] * 2, AXES_CAMERA) == fits
 
 
+@pytest.mark.parametrize(("joint_type", "q"), [("prismatic", 0.2), ("revolute", 0.4)])
+def test_an_upright_base_stands_and_is_better_for_it(joint_type, q):
+    up = R_CAMERA_BASE[:, 2]
+    before, after = [], []
+    for seed in range(20):
+        nocs, points, truth = pair(joint_type, q, noise=0.02, distortion=0.04, seed=seed)
+        fits = fits_of(nocs, points)
+        given = (fits, nocs, points, [JOINT_NONE, CODES[joint_type]], AXES_CAMERA)
+        found = consistent_fits(*given, ConsistencyConfig(tilt=1e-4), up_camera=up)
+        assert np.degrees(np.arccos(found[0].T_camera_box[:3, 2] @ up)) < 0.05
+        before += errors_deg(consistent_fits(*given), truth)
+        after += errors_deg(found, truth)
+    assert np.mean(after) < 0.8 * np.mean(before)
+
+
+def test_an_upright_base_needs_no_joints():
+    nocs, points, truth = pair("revolute", 1.0, noise=0.02, distortion=0.04)
+    fits = fits_of(nocs, points)
+    up = R_CAMERA_BASE[:, 2]
+    found = consistent_fits(fits, nocs, points, [JOINT_NONE] * 2, AXES_CAMERA, up_camera=up)
+    assert errors_deg(found, truth)[0] < errors_deg(fits, truth)[0]
+    assert found[1] is fits[1]
+
+
+def test_a_vertical_that_the_points_contradict_is_left_out():
+    nocs, points, truth = pair("revolute", 1.2, noise=0.02)
+    fits = fits_of(nocs, points)
+    lying = R_CAMERA_BASE[:, 1]
+    codes = [JOINT_NONE, JOINT_REVOLUTE]
+    found = consistent_fits(fits, nocs, points, codes, AXES_CAMERA, up_camera=lying)
+    expected = consistent_fits(fits, nocs, points, codes, AXES_CAMERA)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one.T_camera_box, other.T_camera_box)
+    assert max(errors_deg(found, truth)) < 1.0
+
+
 def test_lengths_are_checked():
     nocs, points, _ = pair("revolute", 1.0)
     with pytest.raises(InvalidArgumentError, match="same parts, not of 2, 2, 2, 1, 2"):

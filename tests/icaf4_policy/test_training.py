@@ -118,6 +118,18 @@ def test_one_network_learns_several_categories(tmp_path, samples):
     assert not np.allclose(told[0].part_probability, told[1].part_probability)
 
 
+def test_objects_stand_upright_if_all_of_the_training_do(tmp_path, samples):
+    standing, validation = samples
+    # A tenth of a radian about x, before the object's pose.
+    tilted = np.eye(4)
+    tilted[1:3, 1:3] = [[np.cos(0.1), -np.sin(0.1)], [np.sin(0.1), np.cos(0.1)]]
+    lean = dataclasses.replace(standing[0], T_camera_object=standing[0].T_camera_object @ tilted)
+    for name, training, upright in (("all", standing, True), ("not", [lean, *standing], False)):
+        weights = tmp_path / f"{name}.safetensors"
+        train(dataclasses.replace(CONFIG, epochs=1), training, validation, weights)
+        assert load_model(weights)[0].config.upright is upright
+
+
 def test_samples_of_other_categories_are_refused(tmp_path, samples):
     config = dataclasses.replace(CONFIG, category=("box",))
     with pytest.raises(InvalidArgumentError, match=r"'toy/0000' among those of box"):
