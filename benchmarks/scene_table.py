@@ -269,7 +269,7 @@ def _claims(
         labels = _label_pixels(picture, sample)
         if not labels.graspable.any():
             return
-        called = seen.affordance[labels.row, labels.column] > 0.5
+        called = seen.graspable[labels.row, labels.column]
         union = np.sum(called | labels.graspable)
         iou = float(np.sum(called & labels.graspable) / union)
     yield entry("affordance@75", iou >= 0.75)

@@ -99,7 +99,7 @@ def evaluate_grasps(
 def _affordance_metrics(seen: Prediction | PointGrasps, sample: Sample) -> dict[str, float]:
     truth = sample.affordance[seen.point_index]
     known = truth != AFFORDANCE_UNKNOWN
-    called = seen.affordance > 0.5
+    called = seen.graspable
     ious = metrics.class_ious(called[known], truth[known] == AFFORDANCE_YES, 2)
     return {
         "affordance_iou": float(ious[1]),
@@ -194,11 +194,11 @@ def _grasp_metrics(
     proposals = {"network": R_object_camera @ points.R_camera_grasp[judged]}
     for name, propose in chance_rows.items():
         proposals[name] = propose(normals_object, top, rng)
-    called = points.affordance[judged] > 0.5
+    called = points.graspable[judged]
     # A call at a point that offers nothing is a miss at any angle; where no label lies near,
     # nothing is known.
     offers_nothing = sample.affordance[points.point_index] == AFFORDANCE_NO
-    wrong_calls = int(np.sum((points.affordance > 0.5) & offers_nothing))
+    wrong_calls = int(np.sum(points.graspable & offers_nothing))
     misses = [metrics.MISS] * wrong_calls
     row: dict[str, float] = {"grasp_points_called": float(called.mean())}
     for name, R_proposals in proposals.items():

@@ -101,6 +101,7 @@ class PointGrasps:
         points_camera: (N, 3), metres.
         point_index: int64 (N,), into the points that were given.
         affordance: (N,), probability that the point can be grasped.
+        graspable: bool (N,), whether the network calls it so.
         R_camera_grasp: (N, J, 3, 3).
         scores: (N, J), probability of each anchor.
     """
@@ -108,6 +109,7 @@ class PointGrasps:
     points_camera: Array
     point_index: NDArray[np.int64]
     affordance: Array
+    graspable: NDArray[np.bool_]
     R_camera_grasp: Array
     scores: Array
 
@@ -122,6 +124,7 @@ class Prediction:
         part: int64 (N,), and part_probability: (N, K).
         npcs: (N, 3) and naocs: (N, 3), of the predicted part, 0.5 at the box's centre.
         affordance: (N,), probability that the point can be grasped.
+        graspable: bool (N,), whether the network calls it so.
         part_boxes: K fits of part boxes (``None`` where a part was not found). Their frame has the
             axes of the part frame and its origin at the centre of the part's canonical box.
         object_boxes: K fits of the object's rest-state box, each from the points of one part: the
@@ -139,6 +142,7 @@ class Prediction:
     npcs: Array
     naocs: Array
     affordance: Array
+    graspable: NDArray[np.bool_]
     part_boxes: tuple[PoseFit | None, ...]
     object_boxes: tuple[PoseFit | None, ...]
     joints: tuple[JointEstimate, ...]
@@ -288,11 +292,13 @@ class Perception:
         order = outputs.grasp_points[0].argsort()
         scores, best = outputs.anchors[0, order].sigmoid().topk(min(top, len(anchors)), dim=-1)
         residuals = outputs.residuals[0, order].take_along_dim(best[..., None], dim=1)
+        affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
         R_level_grasp = anchors.grasps(best.numpy(), residuals.numpy())
         return PointGrasps(
             points_camera=points,
             point_index=pick,
-            affordance=outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float),
+            affordance=affordance,
+            graspable=affordance >= self.model.config.graspable_from,
             R_camera_grasp=np.asarray(R_level_camera, dtype=float).T @ R_level_grasp,
             scores=scores.numpy().astype(float),
         )
@@ -374,6 +380,7 @@ class Perception:
             npcs=npcs,
             naocs=naocs,
             affordance=affordance,
+            graspable=affordance >= self.model.config.graspable_from,
             part_boxes=self._boxes(npcs, points, part, joints, up_camera, rng),
             object_boxes=self._boxes(naocs, points, part, joints, up_camera, rng),
             joints=tuple(joints),

@@ -43,6 +43,7 @@ class ModelConfig:
             through a layer of ``backbone.width_out`` features, without PointNet++.
         upright: whether the base's z axis points up in all that it was trained with, so that fitted
             boxes are made to stand as well.
+        graspable_from: the probability from which on a point is called graspable.
     """
 
     categories: tuple[str, ...]
@@ -54,6 +55,7 @@ class ModelConfig:
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
     features: Features = "color"
     upright: bool = False
+    graspable_from: float = 0.5
 
     def __post_init__(self) -> None:
         if self.num_parts < 1:
@@ -71,6 +73,10 @@ class ModelConfig:
             raise UnknownNameError("scale", self.scale, get_args(Scale))
         if self.features not in CHANNELS:
             raise UnknownNameError("features", self.features, CHANNELS)
+        if not 0 < self.graspable_from < 1:
+            raise InvalidArgumentError(
+                f"graspable_from={self.graspable_from} must be a probability in (0, 1)."
+            )
         if self.num_points < self.backbone.centers[0]:
             raise InvalidArgumentError(
                 f"num_points={self.num_points} must be at least {self.backbone.centers[0]}, the "

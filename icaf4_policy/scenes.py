@@ -29,12 +29,14 @@ class SeenObject:
         prediction: everything about it.
         part_mask: uint8 (H, W): predicted part + 1, 0 where the object is not.
         affordance: float32 (H, W): probability that a pixel of it can be grasped, 0 elsewhere.
+        graspable: bool (H, W): the pixels of it that are called so.
     """
 
     detection: Detection
     prediction: Prediction
     part_mask: NDArray[np.uint8]
     affordance: NDArray[np.float32]
+    graspable: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,6 +126,12 @@ def _spread(
     affordance = np.zeros(mask.shape, dtype=np.float32)
     part_mask[mask] = prediction.part[near] + 1
     affordance[mask] = prediction.affordance[near]
+    graspable = np.zeros(mask.shape, dtype=bool)
+    graspable[mask] = prediction.graspable[near]
     return SeenObject(
-        detection=detection, prediction=prediction, part_mask=part_mask, affordance=affordance
+        detection=detection,
+        prediction=prediction,
+        part_mask=part_mask,
+        affordance=affordance,
+        graspable=graspable,
     )

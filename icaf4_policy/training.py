@@ -14,7 +14,7 @@ import torch
 from tqdm import tqdm
 
 from artgym.datasets.authors import AuthorsSample
-from artgym.datasets.sample import Sample
+from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, Sample
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.authors_targets import targets_from_authors
@@ -32,6 +32,8 @@ from icaf4_policy.targets import (
 )
 from icaf4_policy.training_run import TrainingRun, cosine_rate, keep_freed_memory
 
+#: What ``ModelConfig.graspable_from`` is chosen from.
+_THRESHOLDS = tuple(round(0.05 * i, 2) for i in range(1, 20))
 #: A base whose z axis is nearer to the vertical stands upright, radians.
 UPRIGHT = math.radians(1.0)
 
@@ -227,6 +229,44 @@ def _validate(
     return {name: value / len(targets) for name, value in sums.items()}
 
 
+def _plain_draw(model: Icaf4, config: TrainingConfig) -> DrawConfig:
+    """All points as they are."""
+    return DrawConfig(
+        num_points=config.num_points,
+        num_anchors=model.grasp.shape[0],
+        num_grasp_points=config.num_grasp_points,
+    )
+
+
+@torch.no_grad()
+def decide(model: Icaf4, targets: Sequence[Targets], config: TrainingConfig) -> None:
+    """Sets from which probability on the network calls a point graspable.
+
+    It is the one with the best intersection over union with what the samples say is graspable, on
+    average over those where something is. Few points are: one half would leave out too many.
+
+    Args:
+        model: in evaluation mode.
+        targets: of the validation samples.
+        config: of the training.
+    """
+    draw, device = _plain_draw(model, config), model.length_units.device
+    ious = []
+    for drawn in _batches(targets, draw, config.batch_size, seed=config.seed, epoch=None):
+        batch = drawn.to(device)
+        outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
+        probability = outputs.affordance.softmax(dim=-1)[..., 1]
+        for p, truth in zip(probability, batch.affordance, strict=True):
+            known, yes = truth != AFFORDANCE_UNKNOWN, truth == AFFORDANCE_YES
+            if yes.any():
+                called = (p >= torch.tensor(_THRESHOLDS, device=device)[:, None]) & known
+                either = (called | yes).sum(dim=1)
+                ious.append((called & yes).sum(dim=1) / either)
+    if ious:
+        best = int(torch.stack(ious).mean(dim=0).argmax())
+        model.config = replace(model.config, graspable_from=_THRESHOLDS[best])
+
+
 def train(
     config: TrainingConfig,
     training_samples: Iterable[Sample | AuthorsSample],
@@ -275,11 +315,7 @@ def train(
     )
     settings = [asdict(config), training_digest, validation_digest]
     run = TrainingRun(model, optimizer, settings, lambda validation: validation["total"])
-    draw_plain = DrawConfig(
-        num_points=config.num_points,
-        num_anchors=model.grasp.shape[0],
-        num_grasp_points=config.num_grasp_points,
-    )
+    draw_plain = _plain_draw(model, config)
     jitter = config.color_jitter if config.features == "color" else 0.0
     draw = replace(draw_plain, color_jitter=jitter, learn_points=config.learn_points)
     run.complete(
@@ -289,6 +325,7 @@ def train(
         validate_every=config.validate_every,
         train_epoch=lambda: _train_epoch(run, model, training, draw, config),
         validate=lambda: _validate(model, validation, draw_plain, config),
+        finish=lambda: decide(model, validation, config),
         facts={
             "config": asdict(config),
             "training_samples": len(training),

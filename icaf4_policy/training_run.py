@@ -174,6 +174,7 @@ class TrainingRun:
         validate_every: int,
         train_epoch: Callable[[], None],
         validate: Callable[[], dict[str, float]],
+        finish: Callable[[], None] = lambda: None,
         facts: dict[str, Any],
         log: Path | None = None,
     ) -> None:
@@ -188,6 +189,7 @@ class TrainingRun:
             validate_every: epochs between validations; the last is always validated.
             train_epoch: trains for one epoch, which is number ``epoch``, counted from 0.
             validate: scores the model.
+            finish: called with the best weights in the model, before they are written.
             facts: JSON-able facts for the result's description.
             log: folder for TensorBoard: the mean loss of each epoch and every validation.
 
@@ -218,6 +220,7 @@ class TrainingRun:
             self.model.load_state_dict(self.best)
         self.model.eval()
         if self.epoch == epochs:
+            finish()
             outcome = {"best_epoch": self.best_epoch, "validation": self.history}
             save_model(weights, self.model, facts | outcome)
             resume_path(weights).unlink(missing_ok=True)

@@ -46,6 +46,7 @@ class TruthfulPerception:
             points_camera=sample.points_camera[at].astype(float),
             point_index=at,
             affordance=np.ones(len(at)),
+            graspable=np.ones(len(at), dtype=bool),
             R_camera_grasp=np.stack(first),
             scores=np.ones((len(at), 1)),
         )
@@ -69,6 +70,7 @@ def truth(picture) -> SeenObject:
             np.zeros(0),
         ),
         affordance=np.zeros(0),
+        graspable=np.zeros(0, dtype=bool),
         part_boxes=fits(true_part_boxes(sample)),
         object_boxes=fits(true_object_boxes(sample)),
         joints=(),
@@ -80,6 +82,7 @@ def truth(picture) -> SeenObject:
         prediction=prediction,
         part_mask=picture.part_mask,
         affordance=affordance,
+        graspable=affordance > 0,
     )
 
 
@@ -114,8 +117,8 @@ def test_a_wrong_pose_costs_the_columns_of_poses_alone(picture):
 def test_swapped_parts_and_an_empty_affordance_miss(picture):
     seen = truth(picture)
     swapped = np.choose(picture.part_mask, [0, 2, 1]).astype(np.uint8)
-    nothing = np.zeros_like(seen.affordance)
-    found = row(picture, [dataclasses.replace(seen, part_mask=swapped, affordance=nothing)])
+    nothing = np.zeros_like(seen.graspable)
+    found = row(picture, [dataclasses.replace(seen, part_mask=swapped, graspable=nothing)])
     assert found["part_segmentation@75"] == found["affordance@75"] == found["affordance@95"] == 0.0
     assert found["part_pose@5deg5cm"] == 1.0
 

@@ -6,14 +6,18 @@ import pytest
 import torch
 
 from artgym.datasets.picture_files import write_pictures
+from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES
 from artgym.errors import DamagedFileError, InvalidArgumentError, MissingDependencyError
 from artgym.files import Manifest, ShardEntry
 from icaf4_policy import cli, commands, training_run
+from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
 from icaf4_policy.inference import Perception
+from icaf4_policy.metrics import class_ious
 from icaf4_policy.model import Icaf4, ModelConfig
-from icaf4_policy.training import TrainingConfig, train
+from icaf4_policy.targets import targets_from_sample
+from icaf4_policy.training import TrainingConfig, decide, train
 from icaf4_policy.training_run import resume_path
 from tests.icaf4_policy.toy import toy_picture, toy_sample
 
@@ -128,6 +132,32 @@ def test_objects_stand_upright_if_all_of_the_training_do(tmp_path, samples):
         weights = tmp_path / f"{name}.safetensors"
         train(dataclasses.replace(CONFIG, epochs=1), training, validation, weights)
         assert load_model(weights)[0].config.upright is upright
+
+
+def test_points_are_called_graspable_where_that_agrees_best_with_the_validation(tmp_path, samples):
+    model = train(dataclasses.replace(CONFIG, epochs=1), *samples, tmp_path / "toy.safetensors")
+    assert load_model(tmp_path / "toy.safetensors")[0].config == model.config
+    anchors = anchors_from_config(CONFIG.anchors)
+    targets = [targets_from_sample(s, ("toy",), anchors, 512) for s in samples[0]]
+    # Every point of such a cloud is drawn, in whatever order.
+    assert {len(t.points_level) for t in targets} == {512}
+    decide(model, targets, CONFIG)
+    ious = []
+    for t in targets:
+        with torch.inference_mode():
+            given = (
+                torch.from_numpy(a)[None] for a in (t.points_level, t.colors / np.float32(255))
+            )
+            outputs = model(*given, torch.zeros(1, dtype=torch.long), 1)
+        probability = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy()
+        known, yes = t.affordance != AFFORDANCE_UNKNOWN, t.affordance == AFFORDANCE_YES
+        ious.append(
+            [class_ious((probability >= p)[known], yes[known], 2)[1] for p in np.arange(1, 20) / 20]
+        )
+    means = np.mean(ious, axis=0)
+    chosen = round(20 * model.config.graspable_from) - 1
+    assert means[chosen] == pytest.approx(means.max(), abs=0.02)
+    assert means.max() > means.min() + 0.1
 
 
 def test_samples_of_other_categories_are_refused(tmp_path, samples):
