@@ -38,6 +38,8 @@ def farthest_points(points: NDArray[np.float32], count: int) -> NDArray[np.int64
     # One contiguous array a coordinate: the loop over points then vectorises.
     xs, ys, zs = points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy()
     nearest = np.empty(n, np.float32)
+    # Whole numbers in the same order as the squares, of which the largest is found faster.
+    bits = nearest.view(np.int32)
     for i in range(n):
         nearest[i] = (xs[i] - x0) ** 2 + (ys[i] - y0) ** 2 + (zs[i] - z0) ** 2
     chosen = np.empty(count, np.int64)
@@ -49,7 +51,12 @@ def farthest_points(points: NDArray[np.float32], count: int) -> NDArray[np.int64
         for i in range(n):
             d = (xs[i] - x) ** 2 + (ys[i] - y) ** 2 + (zs[i] - z) ** 2
             nearest[i] = min(nearest[i], d)
-        current = np.argmax(nearest)
+        most = np.int32(-1)
+        for i in range(n):
+            most = max(most, bits[i])
+        current = 0
+        while bits[current] != most:
+            current += 1
     return chosen
 
 
@@ -63,33 +70,40 @@ def ball_query(
     gives the nearest point of all.
     """
     n, m = points.shape[0], centers.shape[0]
-    xs, ys, zs = points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy()
+    # Along x, from a center outwards, until that distance alone is too far.
+    order = np.argsort(points[:, 0], kind="mergesort")
+    xs, ys, zs = points[order, 0], points[order, 1], points[order, 2]
     found = np.empty((m, count), np.int64)
-    squares = np.empty(n, np.float32)
     best = np.empty(count, np.float32)
     for j in range(m):
         x, y, z = centers[j, 0], centers[j, 1], centers[j, 2]
-        for i in range(n):
-            squares[i] = (xs[i] - x) ** 2 + (ys[i] - y) ** 2 + (zs[i] - z) ** 2
         limit = np.float32(radius * radius)
         held = 0
-        for i in range(n):
-            d = squares[i]
-            if d <= limit:
-                # Insertion into the short sorted list of the nearest so far.
-                slot = held if held < count else count - 1
-                while slot > 0 and best[slot - 1] > d:
-                    best[slot] = best[slot - 1]
-                    found[j, slot] = found[j, slot - 1]
-                    slot -= 1
-                best[slot] = d
-                found[j, slot] = i
-                if held < count:
-                    held += 1
-                if held == count:
-                    limit = min(limit, best[count - 1])
+        middle = np.searchsorted(xs, x)
+        for step in (1, -1):
+            i = middle if step == 1 else middle - 1
+            while 0 <= i < n:
+                along = (xs[i] - x) ** 2
+                if along > limit:
+                    break
+                d = along + (ys[i] - y) ** 2 + (zs[i] - z) ** 2
+                if d <= limit:
+                    # Insertion into the short sorted list of the nearest so far.
+                    slot = held if held < count else count - 1
+                    while slot > 0 and best[slot - 1] > d:
+                        best[slot] = best[slot - 1]
+                        found[j, slot] = found[j, slot - 1]
+                        slot -= 1
+                    best[slot] = d
+                    found[j, slot] = order[i]
+                    if held < count:
+                        held += 1
+                    if held == count:
+                        limit = min(limit, best[count - 1])
+                i += step
         if held == 0:
-            found[j, 0] = np.argmin(squares)
+            squares = (xs - x) ** 2 + (ys - y) ** 2 + (zs - z) ** 2
+            found[j, 0] = order[np.argmin(squares)]
             held = 1
         for slot in range(held, count):
             found[j, slot] = found[j, 0]
@@ -106,27 +120,33 @@ def three_nearest(
         Indices (n, 3) and inverse-squared-distance weights (n, 3) that sum to one.
     """
     n, m = points.shape[0], centers.shape[0]
-    xs, ys, zs = centers[:, 0].copy(), centers[:, 1].copy(), centers[:, 2].copy()
+    # Along x, from a point outwards, as above.
+    order = np.argsort(centers[:, 0], kind="mergesort")
+    xs, ys, zs = centers[order, 0], centers[order, 1], centers[order, 2]
     found = np.empty((n, 3), np.int64)
     weights = np.empty((n, 3), np.float32)
-    squares = np.empty(m, np.float32)
     far = np.float32(np.finfo(np.float32).max)
     for i in range(n):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        for j in range(m):
-            squares[j] = (xs[j] - x) ** 2 + (ys[j] - y) ** 2 + (zs[j] - z) ** 2
         d0, d1, d2 = far, far, far
         k0, k1, k2 = 0, 0, 0
-        for j in range(m):
-            d = squares[j]
-            if d < d2:
-                if d < d0:
-                    d0, d1, d2, k0, k1, k2 = d, d0, d1, j, k0, k1
-                elif d < d1:
-                    d1, d2, k1, k2 = d, d1, j, k1
-                else:
-                    d2, k2 = d, j
-        found[i, 0], found[i, 1], found[i, 2] = k0, k1, k2
+        middle = np.searchsorted(xs, x)
+        for step in (1, -1):
+            j = middle if step == 1 else middle - 1
+            while 0 <= j < m:
+                along = (xs[j] - x) ** 2
+                if along >= d2:
+                    break
+                d = along + (ys[j] - y) ** 2 + (zs[j] - z) ** 2
+                if d < d2:
+                    if d < d0:
+                        d0, d1, d2, k0, k1, k2 = d, d0, d1, j, k0, k1
+                    elif d < d1:
+                        d1, d2, k1, k2 = d, d1, j, k1
+                    else:
+                        d2, k2 = d, j
+                j += step
+        found[i, 0], found[i, 1], found[i, 2] = order[k0], order[k1], order[k2]
         w0, w1, w2 = 1.0 / (d0 + 1e-8), 1.0 / (d1 + 1e-8), 1.0 / (d2 + 1e-8)
         total = w0 + w1 + w2
         weights[i, 0], weights[i, 1], weights[i, 2] = w0 / total, w1 / total, w2 / total
