@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+
+import cv2
 import numpy as np
 import pytest
 
@@ -31,8 +34,9 @@ def perception():
     return Perception(model=toy_network(), category="toy")
 
 
-def look(picture, perceptions):
-    scene = ScenePerception(detector=TruthfulDetector(picture), perceptions=perceptions)
+def look(picture, perceptions, detector=None):
+    detector = TruthfulDetector(picture) if detector is None else detector
+    scene = ScenePerception(detector=detector, perceptions=perceptions)
     rng = np.random.default_rng(0)
     return scene.look(picture.rgb, picture.depth, picture.intrinsics, rng=rng)
 
@@ -47,6 +51,23 @@ def test_every_pixel_of_an_object_is_told_its_part(picture):
     assert (seen.part_mask[mask] > 0).mean() > 0.9
     assert seen.part_mask.max() <= 2
     assert len(seen.prediction.part_boxes) == 2
+
+
+def test_depth_gives_a_blunt_mask_its_outline(picture):
+    detector = TruthfulDetector(picture)
+    (whole,) = look(picture, {"toy": perception()}, detector)
+    (found,) = detector.found
+    blunt = cv2.erode(found.mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    detector.found = [dataclasses.replace(found, mask=blunt)]
+    (seen,) = look(picture, {"toy": perception()}, detector)
+    wanted = (whole.part_mask > 0) & found.mask
+    assert (wanted & ~blunt).sum() > 100
+    assert (seen.part_mask > 0)[wanted].mean() > 0.99
+    # What another mask covers stays with the other.
+    taken = found.mask & ~blunt
+    detector.found.append(dataclasses.replace(found, category="unknown", mask=taken))
+    (seen,) = look(picture, {"toy": perception()}, detector)
+    assert not seen.part_mask[taken].any()
 
 
 def test_the_same_scene_gives_the_same(picture):
