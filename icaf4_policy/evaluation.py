@@ -182,7 +182,8 @@ def _grasp_metrics(
 ) -> dict[str, float]:
     label = sample.grasp_row[points.point_index]
     tries = sample.successful_tries()
-    graspable = (label >= 0) & np.any(tries, axis=1)[label]
+    # Points without a label, -1, find the last entry.
+    graspable = np.append(np.any(tries, axis=1), False)[label]
     judged = np.flatnonzero(graspable)
     if not len(judged):
         return {}

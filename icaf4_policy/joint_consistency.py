@@ -27,7 +27,7 @@ Array = NDArray[np.floating]
 #: Standard deviation of the turn that a joint itself leaves to chance, radians.
 _EXACT = 1e-6
 #: How often the turns are worked out, each time about those of before.
-_ITERATIONS = 3
+_ITERATIONS = 2
 #: The link of an upright base to the world, beside the codes of ``Sample.joint_type``.
 _UPRIGHT = 2
 #: A fit without error may have so much after it was computed anew, in normalised units.

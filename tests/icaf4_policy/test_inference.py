@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from artgym.datasets.sample import JOINT_NONE
+from artgym.datasets.sample import AFFORDANCE_UNKNOWN, JOINT_NONE
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle, matrix_from_axis_angle
 from icaf4_policy import cli
@@ -206,6 +206,20 @@ def test_evaluation_gives_every_metric(perception, sample):
         calls, right = (row[f"{name}/{source}/precision@20"] for name in ("grasp_calls", "grasp"))
         assert 0 <= calls <= right <= 1
     assert 0 < row["label_density"] <= row["label_density_graspable"] <= 1
+
+
+def test_a_view_without_grasp_labels_has_the_other_metrics(perception, sample):
+    labelled = ("grasp_bits", "grasp_points_part", "grasp_normals_part", "grasp_part")
+    bare = dataclasses.replace(
+        sample,
+        **{name: getattr(sample, name)[:0] for name in labelled},
+        grasp_row=np.full_like(sample.grasp_row, -1),
+        affordance=np.full_like(sample.affordance, AFFORDANCE_UNKNOWN),
+    )
+    row, _ = evaluate_sample(perception, bare, rng())
+    whole, _ = evaluate_sample(perception, sample, rng())
+    assert row["part_miou"] == whole["part_miou"]
+    assert not any(name.startswith("grasp") for name in row)
 
 
 def test_grasps_can_be_evaluated_alone(perception, sample):
