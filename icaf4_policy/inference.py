@@ -125,8 +125,8 @@ class Prediction:
         npcs: (N, 3) and naocs: (N, 3), of the predicted part, 0.5 at the box's centre.
         affordance: (N,), probability that the point can be grasped.
         graspable: bool (N,), whether the network calls it so.
-        part_boxes: K fits of part boxes (``None`` where a part was not found). Their frame has the
-            axes of the part frame and its origin at the centre of the part's canonical box.
+        part_boxes: K fits of the parts' canonical boxes (``None`` where a part was not found): axes
+            and centre.
         object_boxes: K fits of the object's rest-state box, each from the points of one part: the
             pose the object would have if the whole moved with that part; that of part 0 is the
             object's pose.

@@ -2,8 +2,8 @@
 
 The frames of a part and of the base differ by the motion of the joint alone: they have the same
 axes after a slide, and after a turn share the joint's axis. The base of an object that stands
-upright has its z axis along the vertical. Fits from each part's own points miss that by their
-errors, so that what one part is surer of helps the others. Taken are the turns that are most
+upright has the z axis of its box along the vertical. Fits from each part's own points miss that by
+their errors, so that what one part is surer of helps the others. Taken are the turns that are most
 probable, given how sure each fit is of each direction, the network of the axis, and who looks of
 the vertical: the update of an iterated Kalman filter.
 """

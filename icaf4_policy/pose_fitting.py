@@ -32,7 +32,7 @@ class PoseFit:
     """A fitted box.
 
     Attributes:
-        T_camera_box: float64 (4, 4). The box frame has the axes of the part (or object) frame and
+        T_camera_box: float64 (4, 4). The box frame has the axes of the canonical box and
             its origin where the normalised coordinates are 0.5: at the canonical box's centre.
         scale: metres of one normalised unit, the diagonal of the canonical box; 0 where the
             coordinates tell nothing.

@@ -43,7 +43,8 @@ class Targets:
             ``match_start[g]:match_start[g + 1]`` of the next two.
         match_anchor: int16 (n,), matched anchors (the mask M of Eq. 3, sparse).
         match_residual: float16 (n, r), from the anchor to its nearest successful grasp (Eq. 4).
-        tilt: radians, from the vertical to the z axis of the base; infinite where not known.
+        tilt: radians, from the vertical to the z axis of the base's canonical box; infinite where
+            not known.
     """
 
     category: int
@@ -136,6 +137,7 @@ def targets_from_sample(
     R_level_camera = sample.R_level_camera.astype(float)
 
     row, matched, residual = grasp_matches(sample, anchors)
+    up_canonical = R_level_camera[2] @ sample.T_camera_object[:3, :3] @ sample.R_object_canonical
     return Targets(
         category=list(categories).index(category),
         points_level=points_level[keep].astype(np.float32),
@@ -153,7 +155,7 @@ def targets_from_sample(
         match_start=np.searchsorted(row, np.arange(len(sample.grasp_part) + 1)).astype(np.int32),
         match_anchor=matched.astype(np.int16),
         match_residual=residual.astype(np.float16),
-        tilt=math.acos(min(1.0, float(R_level_camera[2] @ sample.T_camera_object[:3, 2]))),
+        tilt=math.acos(min(1.0, float(up_canonical[2]))),
     )
 
 

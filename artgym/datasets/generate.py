@@ -422,9 +422,12 @@ def _sample(
         np.concatenate([points_true[kept], np.ones((len(kept), 1))], axis=1),
     )[:, :3]
     grasp_row, affordance = _nearest_labels(labels, part, points_part, normals_part, config)
-    boxes = [canonical_box(link.bounds()) for link in obj.links]
+    boxes = [canonical_box(bounds) for bounds in obj.canonical_bounds]
     centers, scales = np.stack([c for c, _ in boxes]), np.array([s for _, s in boxes])
-    object_center, object_scale = canonical_box(obj.rest_bounds)
+    low, high = np.swapaxes(obj.canonical_bounds, 0, 1)
+    object_center, object_scale = canonical_box(np.stack([low.min(axis=0), high.max(axis=0)]))
+    R_object_canonical = np.asarray(obj.R_object_canonical, dtype=float)
+    points_canonical = points_part @ R_object_canonical
     types, axes, pivots, fractions = _joints(obj, T_camera_object, shown.placed.q)
     return Sample(
         object_id=obj.object_id,
@@ -435,9 +438,9 @@ def _sample(
         .astype(np.float32),
         colors=rgb.reshape(-1, 3)[kept],
         part=part.astype(np.uint8),
-        npcs=((points_part - centers[part]) / scales[part, None] + 0.5).astype(np.float32),
+        npcs=((points_canonical - centers[part]) / scales[part, None] + 0.5).astype(np.float32),
         # Link frames coincide with the object's at rest: a part's point keeps its coordinates.
-        naocs=((points_part - object_center) / object_scale + 0.5).astype(np.float32),
+        naocs=((points_canonical - object_center) / object_scale + 0.5).astype(np.float32),
         affordance=affordance,
         grasp_row=grasp_row,
         grasp_bits=labels.bits,
@@ -445,6 +448,7 @@ def _sample(
         grasp_normals_part=labels.normals_part,
         grasp_part=labels.part,
         T_camera_parts=T_camera_parts.astype(np.float32),
+        R_object_canonical=R_object_canonical.astype(np.float32),
         part_centers=centers.astype(np.float32),
         part_scales=scales.astype(np.float32),
         T_camera_object=T_camera_object.astype(np.float32),

@@ -61,6 +61,7 @@ _SHAPES: dict[str, tuple[int | str, ...]] = {
     "grasp_normals_part": ("G", 3),
     "grasp_part": ("G",),
     "T_camera_parts": ("K", 4, 4),
+    "R_object_canonical": (3, 3),
     "part_centers": ("K", 3),
     "part_scales": ("K",),
     "T_camera_object": (4, 4),
@@ -288,10 +289,16 @@ def _get_picture(file: h5py.File, index: int, count: int) -> Picture:
     return Picture(**arrays, samples=tuple(_get_sample(file, index, k) for k in range(count)))
 
 
+#: What stands in for arrays that shards of before did not have.
+_DEFAULTS: dict[str, NDArray[Any]] = {"R_object_canonical": np.eye(3, dtype=np.float32)}
+
+
 def _get_sample(file: h5py.File, picture: int, index: int) -> Sample:
     group = _subgroup(_subgroup(file, _picture_name(picture)), _object_name(index))
     what = f"sample {index} of picture {picture}"
-    arrays = _arrays(group, SAMPLE_ARRAYS, what)
+    is_there = {name: name not in _DEFAULTS or name in group for name in SAMPLE_ARRAYS}
+    arrays = _arrays(group, [name for name in SAMPLE_ARRAYS if is_there[name]], what)
+    arrays |= {name: _DEFAULTS[name].copy() for name in SAMPLE_ARRAYS if not is_there[name]}
     if misfit := _misfit(arrays):
         raise DamagedFileError(f"{what}: {misfit}")
     return Sample(object_id=get_text(group, "object_id"), **arrays)

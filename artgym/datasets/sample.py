@@ -48,8 +48,11 @@ class Sample:
         grasp_normals_part: float32 (G, 3): their outward unit normals, same frame.
         grasp_part: uint8 (G,): the part each labelled point lies on.
         T_camera_parts: float32 (K, 4, 4).
-        part_centers: float32 (K, 3) and part_scales: float32 (K,), part frame: NPCS is
-            ``(p - center) / scale + 0.5``, the scale being the canonical box's diagonal.
+        R_object_canonical: float32 (3, 3): the axes of all canonical boxes in the frames of the
+            object and its parts, which coincide at rest.
+        part_centers: float32 (K, 3) and part_scales: float32 (K,): NPCS is
+            ``(R_object_canonical.T @ p - center) / scale + 0.5`` of a point p in its part's frame,
+            the scale being the canonical box's diagonal.
         T_camera_object: float32 (4, 4), the root link.
         T_object_rest_parts: float32 (K, 4, 4): part frames in the object's rest state.
         object_center: float32 (3,) and object_scale: float32 (), the same for NAOCS.
@@ -74,6 +77,7 @@ class Sample:
     grasp_normals_part: NDArray[np.float32]
     grasp_part: NDArray[np.uint8]
     T_camera_parts: NDArray[np.float32]
+    R_object_canonical: NDArray[np.float32]
     part_centers: NDArray[np.float32]
     part_scales: NDArray[np.float32]
     T_camera_object: NDArray[np.float32]

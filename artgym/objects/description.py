@@ -45,7 +45,7 @@ from artgym.objects.model import (
 )
 
 #: Raised by one with each change that an older reader cannot read.
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 FORMAT = "artgym-object"
 JSON_NAME, ARRAYS_NAME = "object.json", "arrays.npz"
@@ -597,11 +597,16 @@ def _convex_complaints(convex: Convex) -> _Complaints:
 
 
 def _shape_complaints(shape: Shape) -> _Complaints:
-    if shape.rotation == Shape.rotation:
-        return
-    R = np.asarray(shape.rotation, dtype=float)
-    if not np.allclose(R @ R.T, np.eye(3), atol=_UNIT_TOLERANCE) or np.linalg.det(R) < 0:
+    if not _is_rotation(shape.rotation):
         yield "rotation", "is no rotation matrix"
+
+
+def _is_rotation(rows: tuple[Vector, Vector, Vector]) -> bool:
+    if rows == Shape.rotation:
+        return True
+    R = np.asarray(rows, dtype=float)
+    is_orthogonal = np.allclose(R @ R.T, np.eye(3), atol=_UNIT_TOLERANCE)
+    return is_orthogonal and bool(np.linalg.det(R) > 0)
 
 
 def _material_complaints(material: Material) -> _Complaints:
@@ -657,6 +662,8 @@ def _joint_complaints(joint: Joint) -> _Complaints:
 def _object_complaints(obj: ArticulatedObject) -> _Complaints:
     if not obj.links:
         yield "links", "an object needs at least one link"
+    if not _is_rotation(obj.R_object_canonical):
+        yield "R_object_canonical", "is no rotation matrix"
 
 
 _REQUIREMENTS: dict[type, Callable[[Any], _Complaints]] = {

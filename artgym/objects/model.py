@@ -399,6 +399,9 @@ class ArticulatedObject:
         links: parents before children; the index of a link is the index of its part.
         joints: one for each link but the root, in the order of the links.
         attributes: what the generator chose, for statistics: ("handle", "bar"), ...
+        R_object_canonical: axes of the canonical boxes of the object and its parts (NAOCS, NPCS),
+            rows of a rotation matrix. They are the object's own unless it is held turned on a
+            stand: what is normalised has to follow from what is seen, whatever holds it.
     """
 
     object_id: str
@@ -406,6 +409,7 @@ class ArticulatedObject:
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     attributes: Mapping[str, str | float] = field(default_factory=dict)
+    R_object_canonical: tuple[Vector, Vector, Vector] = Shape.rotation
 
     def __post_init__(self) -> None:
         names = [link.name for link in self.links]
@@ -465,9 +469,16 @@ class ArticulatedObject:
 
     @cached_property
     def rest_bounds(self) -> Array:
-        """Axis-aligned box (2, 3) of the whole object at rest, object frame: NAOCS's box."""
+        """Axis-aligned box (2, 3) of the whole object at rest, object frame."""
         bounds = np.stack([link.bounds() for link in self.links])
         return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
+
+    @cached_property
+    def canonical_bounds(self) -> Array:
+        """Boxes (K, 2, 3) of the parts at rest along the canonical axes: NPCS's boxes."""
+        R = np.asarray(self.R_object_canonical)
+        corners = [np.concatenate([s.corners_link() for s in each.shapes]) for each in self.links]
+        return np.stack([[(c @ R).min(axis=0), (c @ R).max(axis=0)] for c in corners])
 
     def bounds_at(self, q: Array) -> Array:
         """An axis-aligned box (2, 3) around the object at joint positions q, object frame.

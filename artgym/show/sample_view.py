@@ -93,7 +93,8 @@ def instance_color(index: int) -> Color:
 def joint_arrow(sample: Sample, part: int) -> tuple[Array, Array]:
     """Start and end (2 x (3,)) of an arrow along a part's joint axis, camera frame, metres."""
     axis, scale = sample.joint_axis_camera[part], float(sample.part_scales[part])
-    center = transforms.apply(sample.T_camera_parts[part], sample.part_centers[part][None])[0]
+    center_part = sample.R_object_canonical @ sample.part_centers[part]
+    center = transforms.apply(sample.T_camera_parts[part], center_part[None])[0]
     if sample.joint_type[part] == JOINT_PRISMATIC:
         return center, center + scale * axis
     # The place on the axis that is nearest to the part's middle.

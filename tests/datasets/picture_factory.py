@@ -63,6 +63,7 @@ def random_sample(
         grasp_normals_part=floats(num_grasp_points, 3),
         grasp_part=integers(0, num_parts, (num_grasp_points,), np.uint8),
         T_camera_parts=floats(num_parts, 4, 4),
+        R_object_canonical=floats(3, 3),
         part_centers=floats(num_parts, 3),
         part_scales=floats(num_parts),
         T_camera_object=floats(4, 4),

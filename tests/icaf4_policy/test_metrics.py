@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -77,8 +79,18 @@ def test_mean_rows_leaves_gaps_out():
     assert np.isnan(means["c"])
 
 
-def test_true_boxes_explain_the_normalised_coordinates():
-    sample = toy_sample(0)
+@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.3, -0.5, 1.0]])
+def test_true_boxes_explain_the_normalised_coordinates(turn):
+    R, sample = matrix_from_axis_angle(turn), toy_sample(0)
+    # The same boxes' corners do not matter here: only their axes and centres.
+    sample = dataclasses.replace(
+        sample,
+        R_object_canonical=R,
+        npcs=(sample.npcs - 0.5) @ R + 0.5,
+        naocs=(sample.naocs - 0.5) @ R + 0.5,
+        part_centers=sample.part_centers @ R,
+        object_center=sample.object_center @ R,
+    )
     for boxes, coordinates, scales in (
         (true_part_boxes(sample), sample.npcs, sample.part_scales),
         (true_object_boxes(sample), sample.naocs, np.repeat(sample.object_scale, 2)),

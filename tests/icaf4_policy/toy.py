@@ -113,6 +113,7 @@ def toy_picture(seed: int = 0, num_points: int = 700) -> Picture:
         grasp_normals_part=grasp_normals_part.astype(np.float32),
         grasp_part=grasp_part.astype(np.uint8),
         T_camera_parts=T_camera_parts.astype(np.float32),
+        R_object_canonical=np.eye(3, dtype=np.float32),
         part_centers=np.zeros((2, 3), np.float32),
         part_scales=scales.astype(np.float32),
         T_camera_object=T_camera_object.astype(np.float32),

@@ -196,6 +196,7 @@ def make_cutter(object_id: str, rng: np.random.Generator) -> ArticulatedObject:
             ),
         ),
         attributes={"family": family, "handle": handle},
+        R_object_canonical=mount.R_object_layout,
     )
 
 

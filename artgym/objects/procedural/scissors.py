@@ -171,6 +171,7 @@ def make_scissors(object_id: str, rng: np.random.Generator) -> ArticulatedObject
             ),
         ),
         attributes={"family": family, "handle": "ring", "held": held},
+        R_object_canonical=mount.R_object_layout,
     )
 
 

@@ -39,6 +39,11 @@ class Mount:
 
     T_object_layout: Array
 
+    @property
+    def R_object_layout(self) -> tuple[Vector, Vector, Vector]:
+        """The layout's axes in the object's frame, rows of a rotation matrix."""
+        return _rows(self.T_object_layout[:3, :3])
+
     @classmethod
     def over_origin(cls, shapes: Iterable[Shape], R_object_layout: Any, low: float) -> Mount:
         """Turned by a rotation (3, 3), its middle over the origin, its lowest point at z = low."""
@@ -127,12 +132,13 @@ def rod(start: Iterable[float], end: Iterable[float], radius: float, look: Mater
 
 
 def _with_pose(shape: Shape, T_link_shape: Array) -> Shape:
-    rotation = tuple(_vector(row) for row in T_link_shape[:3, :3])
     return replace(
-        shape,
-        position=_vector(T_link_shape[:3, 3]),
-        rotation=cast("tuple[Vector, Vector, Vector]", rotation),
+        shape, position=_vector(T_link_shape[:3, 3]), rotation=_rows(T_link_shape[:3, :3])
     )
+
+
+def _rows(R: Array) -> tuple[Vector, Vector, Vector]:
+    return cast("tuple[Vector, Vector, Vector]", tuple(_vector(row) for row in R))
 
 
 def _vector(values: Array) -> Vector:
