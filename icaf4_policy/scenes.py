@@ -23,6 +23,8 @@ Mask = NDArray[np.bool_]
 
 #: What is nearer to a detection's mask than this share of its larger side may belong to it.
 _REACH = 0.06
+#: Loose pieces of a mask that are smaller than this share of it are left out.
+_CRUMB = 0.05
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,7 +139,13 @@ def _outlined(mask: Mask, others: Sequence[Mask], stands_out: Mask) -> Mask:
     beside = cv2.dilate(mask.astype(np.uint8), disc) > 0
     for other in others:
         beside &= ~other
-    return (mask | beside) & stands_out
+    outlined = (mask | beside) & stands_out
+    _, pieces = cv2.connectedComponents(outlined.astype(np.uint8), connectivity=4)
+    piece = pieces.astype(np.int64)
+    sizes = np.bincount(piece.ravel())
+    # Piece 0 is the rest. Crumbs of something else would make the cloud of another size.
+    sizes[0] = 0
+    return (sizes > _CRUMB * sizes.sum())[piece]
 
 
 def _spread(

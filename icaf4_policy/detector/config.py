@@ -75,18 +75,15 @@ class AugmentationConfig:
             camera came nearer.
         shift: largest shift, as a share of the picture's sides.
         color_jitter: spread of the changes of brightness, contrast and tint.
-        depth_holes: share of pictures whose depth is missing in places, or in every fifth of them
-            everywhere, as of a real sensor that shiny and dark things give nothing back to.
     """
 
     flip: float = 0.5
     zoom: float = 0.2
     shift: float = 0.1
     color_jitter: float = 0.2
-    depth_holes: float = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("flip", "zoom", "shift", "color_jitter", "depth_holes"):
+        for name in ("flip", "zoom", "shift", "color_jitter"):
             if not 0 <= getattr(self, name) <= 1:
                 raise InvalidArgumentError(f"{name}={getattr(self, name)} must be in [0, 1].")
 

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import distance_transform_edt
 
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.checkpoint import load_network
@@ -17,6 +18,9 @@ from icaf4_policy.detector.config import DetectorConfig
 from icaf4_policy.detector.model import DetectorNetwork
 from icaf4_policy.detector.pictures import fitting_scale, network_input, shrunk
 from icaf4_policy.detector.torchvision_ops import paste_masks_in_image
+
+#: Where more of a picture than this share is unknown in one piece, there is no hole but nothing.
+_LARGEST_HOLE = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,7 +94,7 @@ class Detector:
             )
         if rgb.dtype != np.uint8:
             raise InvalidArgumentError(f"rgb is of dtype {rgb.dtype}: expected uint8.")
-        depth = np.where(np.isfinite(depth), depth, np.float32(0.0))
+        depth = without_holes(np.where(np.isfinite(depth), depth, np.float32(0.0)))
         image = network_input(
             shrunk(rgb, config.input_size, cv2.INTER_AREA),
             shrunk(depth, config.input_size, cv2.INTER_NEAREST_EXACT),
@@ -116,6 +120,30 @@ class Detector:
                 found["labels"], found["scores"], boxes, masks, strict=True
             )
         ]
+
+
+def without_holes(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Depth whose holes have the depth of the nearest pixel that is known.
+
+    A real sensor gives nothing back from edges, shiny and dark things; simulated depth, which
+    detectors learn from, is unknown only where nothing is: of that, too large for a hole, nothing
+    is filled.
+
+    Args:
+        depth: (H, W), metres, 0 where unknown.
+    """
+    unknown = depth <= 0
+    _, pieces = cv2.connectedComponents(unknown.astype(np.uint8), connectivity=4)
+    piece = pieces.astype(np.int64)
+    is_hole = np.bincount(piece.ravel()) < _LARGEST_HOLE * depth.size
+    # Piece 0 is what is known.
+    is_hole[0] = False
+    if not is_hole.any():
+        return depth
+    row, column = np.asarray(
+        distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    )
+    return np.where(is_hole[piece], depth[row, column], depth)
 
 
 def _network_from_json(fields: dict[str, Any]) -> DetectorNetwork:

@@ -21,9 +21,6 @@ Array = NDArray[np.floating]
 
 #: Of an object that the edge of a changed picture cuts, less than this share is left unlabelled.
 _SMALLEST_SHARE = 0.25
-#: Of the pictures with holes in their depth, the share that has none left; most holes of another,
-#: and the largest radius as a share of the picture's sides.
-_NO_DEPTH, _MOST_HOLES, _LARGEST_HOLE = 0.2, 20, 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,39 +158,16 @@ def changed(
     )
     lift = 255.0 * config.color_jitter * rng.uniform(-1.0, 1.0)
     rgb = warped(picture.rgb, cv2.INTER_LINEAR) * gain + lift
-    depth = (warped(picture.depth, cv2.INTER_NEAREST) / zoom).astype(np.float32)
-    if rng.random() < config.depth_holes:
-        _make_holes(depth, rng)
     moved = replace(
         picture,
         rgb=rgb.clip(0.0, 255.0).astype(np.uint8),
-        depth=depth,
+        depth=warped(picture.depth, cv2.INTER_NEAREST) / np.float32(zoom),
         instance_mask=warped(picture.instance_mask, cv2.INTER_NEAREST),
         boxes=boxes,
     )
     pixels = np.bincount(picture.instance_mask.reshape(-1), minlength=len(boxes) + 1)[1:]
     kept = _without_the_unseen(moved, _SMALLEST_SHARE * pixels * zoom**2)
     return kept if len(kept.labels) else picture
-
-
-def _make_holes(depth: NDArray[np.float32], rng: np.random.Generator) -> None:
-    """Takes depth away, in place: all of it, or up to as many ellipses as ``_MOST_HOLES``."""
-    if rng.random() < _NO_DEPTH:
-        depth[:] = 0.0
-        return
-    size = np.array([depth.shape[1], depth.shape[0]])
-    for _ in range(int(rng.integers(1, _MOST_HOLES + 1))):
-        center, radii = rng.uniform(size=2) * size, rng.uniform(size=2) ** 2 * _LARGEST_HOLE * size
-        cv2.ellipse(
-            depth,
-            tuple(map(int, center)),
-            tuple(map(int, radii)),
-            angle=float(rng.uniform(0.0, 180.0)),
-            startAngle=0.0,
-            endAngle=360.0,
-            color=0.0,
-            thickness=cv2.FILLED,
-        )
 
 
 def _without_the_unseen(picture: ShrunkPicture, least: Array) -> ShrunkPicture:
