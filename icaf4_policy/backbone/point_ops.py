@@ -87,15 +87,18 @@ def ball_query(
                 if along > limit:
                     break
                 d = along + (ys[i] - y) ** 2 + (zs[i] - z) ** 2
-                if d <= limit:
-                    # Insertion into the short sorted list of the nearest so far.
+                index = order[i]
+                if d < limit or (d == limit and (held < count or index < found[j, count - 1])):
+                    # Insertion into the short sorted list of the nearest so far, first of equals.
                     slot = held if held < count else count - 1
-                    while slot > 0 and best[slot - 1] > d:
+                    while slot > 0 and (
+                        best[slot - 1] > d or (best[slot - 1] == d and found[j, slot - 1] > index)
+                    ):
                         best[slot] = best[slot - 1]
                         found[j, slot] = found[j, slot - 1]
                         slot -= 1
                     best[slot] = d
-                    found[j, slot] = order[i]
+                    found[j, slot] = index
                     if held < count:
                         held += 1
                     if held == count:
@@ -135,18 +138,19 @@ def three_nearest(
             j = middle if step == 1 else middle - 1
             while 0 <= j < m:
                 along = (xs[j] - x) ** 2
-                if along >= d2:
+                if along > d2:
                     break
                 d = along + (ys[j] - y) ** 2 + (zs[j] - z) ** 2
-                if d < d2:
-                    if d < d0:
-                        d0, d1, d2, k0, k1, k2 = d, d0, d1, j, k0, k1
-                    elif d < d1:
-                        d1, d2, k1, k2 = d, d1, j, k1
+                index = order[j]
+                if d < d2 or (d == d2 and index < k2):
+                    if d < d0 or (d == d0 and index < k0):
+                        d0, d1, d2, k0, k1, k2 = d, d0, d1, index, k0, k1
+                    elif d < d1 or (d == d1 and index < k1):
+                        d1, d2, k1, k2 = d, d1, index, k1
                     else:
-                        d2, k2 = d, j
+                        d2, k2 = d, index
                 j += step
-        found[i, 0], found[i, 1], found[i, 2] = order[k0], order[k1], order[k2]
+        found[i, 0], found[i, 1], found[i, 2] = k0, k1, k2
         w0, w1, w2 = 1.0 / (d0 + 1e-8), 1.0 / (d1 + 1e-8), 1.0 / (d2 + 1e-8)
         total = w0 + w1 + w2
         weights[i, 0], weights[i, 1], weights[i, 2] = w0 / total, w1 / total, w2 / total
