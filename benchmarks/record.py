@@ -35,7 +35,7 @@ def provenance(module: str) -> dict[str, Any]:
         module: the module that was run, "benchmarks.success_rate".
     """
     return {
-        "command": shlex.join(["python", "-m", module, *sys.argv[1:]]),
+        "command": shlex.join(["python", "-m", module, *map(_without_machine, sys.argv[1:])]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "git": git_state(),
         "versions": {
@@ -45,6 +45,12 @@ def provenance(module: str) -> dict[str, Any]:
         },
         "hardware": hardware(),
     }
+
+
+def _without_machine(argument: str) -> str:
+    """An argument whose absolute path, which is of one machine, gives way to its last part."""
+    option, equals, value = argument.rpartition("=")
+    return option + equals + (Path(value).name if Path(value).is_absolute() else value)
 
 
 def git_state() -> dict[str, Any] | None:

@@ -239,7 +239,7 @@ def _plain_draw(model: Icaf4, config: TrainingConfig) -> DrawConfig:
 
 
 @torch.no_grad()
-def decide(model: Icaf4, targets: Sequence[Targets], config: TrainingConfig) -> None:
+def set_threshold(model: Icaf4, targets: Sequence[Targets], config: TrainingConfig) -> None:
     """Sets from which probability on the network calls a point graspable.
 
     It is the one with the best intersection over union with what the samples say is graspable, on
@@ -325,7 +325,7 @@ def train(
         validate_every=config.validate_every,
         train_epoch=lambda: _train_epoch(run, model, training, draw, config),
         validate=lambda: _validate(model, validation, draw_plain, config),
-        finish=lambda: decide(model, validation, config),
+        finish=lambda: set_threshold(model, validation, config),
         facts={
             "config": asdict(config),
             "training_samples": len(training),

@@ -159,7 +159,8 @@ def _sheet(obj: ArticulatedObject) -> bytes:
             None,
             "diagonals (scale of NPCS): "
             + ", ".join(
-                f"{link.name} {canonical_box(link.bounds())[1]:.3f} m" for link in obj.links
+                f"{name} {canonical_box(bounds)[1]:.3f} m"
+                for name, bounds in zip(obj.part_names, obj.canonical_bounds, strict=True)
             ),
         ),
     ]

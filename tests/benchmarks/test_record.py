@@ -31,3 +31,10 @@ def test_provenance_names_command_and_commit(monkeypatch):
     found = provenance("benchmarks.success_rate")
     assert found["command"] == "python -m benchmarks.success_rate --seed 1"
     assert found["git"] is None or len(found["git"]["commit"]) == 40
+
+
+def test_a_command_names_no_place_of_one_machine(monkeypatch, tmp_path):
+    given = ["table1", "--data", str(tmp_path / "data"), f"--work={tmp_path / 'w'}", "--views", "2"]
+    monkeypatch.setattr("sys.argv", ["x.py", *given])
+    command = provenance("benchmarks.perception")["command"]
+    assert command == "python -m benchmarks.perception table1 --data data --work=w --views 2"

@@ -17,7 +17,7 @@ from icaf4_policy.inference import Perception
 from icaf4_policy.metrics import class_ious
 from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.targets import targets_from_sample
-from icaf4_policy.training import TrainingConfig, decide, train
+from icaf4_policy.training import TrainingConfig, set_threshold, train
 from icaf4_policy.training_run import resume_path
 from tests.icaf4_policy.toy import toy_picture, toy_sample
 
@@ -141,7 +141,7 @@ def test_points_are_called_graspable_where_that_agrees_best_with_the_validation(
     targets = [targets_from_sample(s, ("toy",), anchors, 512) for s in samples[0]]
     # Every point of such a cloud is drawn, in whatever order.
     assert {len(t.points_level) for t in targets} == {512}
-    decide(model, targets, CONFIG)
+    set_threshold(model, targets, CONFIG)
     ious = []
     for t in targets:
         with torch.inference_mode():
