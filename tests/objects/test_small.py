@@ -166,3 +166,25 @@ def _extents(obj: ArticulatedObject) -> np.ndarray:
         bodies = (np.concatenate([fixed, moved]), fixed, moved)
         rows.append([np.sort(np.ptp(body @ R_object_layout, axis=0)) for body in bodies])
     return np.array(rows)
+
+
+@pytest.mark.parametrize(("category", "along"), [("cutter", 0), ("scissors", 2)])
+def test_canonical_boxes_lie_along_the_tool_however_it_is_held(category, along):
+    axes = []
+    for obj in objects(category, 20):
+        R = np.asarray(obj.R_object_canonical)
+        np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-9)
+        axis = np.asarray(obj.joints[0].axis)
+        axes.append(axis)
+        np.testing.assert_allclose(np.abs(axis @ R), np.eye(3)[along], atol=1e-9)
+        for link, (low, high) in zip(obj.links, obj.canonical_bounds, strict=True):
+            corners = np.concatenate([s.corners_link() for s in link.shapes]) @ R
+            np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], [low, high])
+    # Along the object's own axes it would lie anyhow.
+    assert np.ptp(axes, axis=0).max() > 0.5
+
+
+def test_what_stands_upright_has_its_own_axes():
+    for obj in objects("stapler", 5):
+        np.testing.assert_array_equal(obj.R_object_canonical, np.eye(3))
+        np.testing.assert_allclose(obj.canonical_bounds[0], obj.links[0].bounds())
