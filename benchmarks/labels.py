@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from artgym.annotation.annotate import Labels, labelled_categories, labelled_ids, read_labels
 from artgym.annotation.filter import Verdict
-from artgym.annotation.trial import TRIAL_ENDS
+from artgym.annotation.trial import TRIAL_ENDS, try_grasp
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.grasps import APPROACH_RINGS, NUM_ROLLS
 from artgym.objects import catalog
@@ -38,17 +38,22 @@ class LabelsConfig:
         category: categories of objects; by default those with shipped labels.
         split: splits; those without labels are left out.
         labels: folder with {category}/{split}, instead of the shipped labels.
-        seed: of the chance rows.
+        retried: tries of each category and split that are made once more, half of them successes:
+            on another processor than the labels' the last digits differ, and now and then the end.
+        seed: of the chance rows and of what is tried again.
         out: folder for labels.json.
     """
 
     category: tuple[str, ...] = field(default_factory=labelled_categories)
     split: tuple[catalog.Split, ...] = ("train", "val", "test")
     labels: Path | None = None
+    retried: int = 100
     seed: int = 0
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
+        if self.retried < 0:
+            raise InvalidArgumentError(f"retried={self.retried}: expected 0 or more.")
         for category in self.category:
             catalog.category(category)
 
@@ -67,7 +72,9 @@ def measure(config: LabelsConfig) -> dict[str, Any]:
             if ids:
                 bar = tqdm(ids, desc=f"labels {category}/{split}", unit="object", file=sys.stderr)
                 labels = [read_labels(object_id, config.labels) for object_id in bar]
-                rows.setdefault(category, {})[split] = statistics(labels, config.seed)
+                rows.setdefault(category, {})[split] = statistics(
+                    labels, config.seed, config.retried
+                )
     if not rows:
         raise InvalidArgumentError(
             f"no labels for {', '.join(config.category)}: run `artgym annotate` first."
@@ -79,12 +86,13 @@ def measure(config: LabelsConfig) -> dict[str, Any]:
     }
 
 
-def statistics(labels: Sequence[Labels], seed: int) -> dict[str, Any]:
+def statistics(labels: Sequence[Labels], seed: int, retried: int = 0) -> dict[str, Any]:
     """The numbers of one category and split.
 
     Args:
         labels: of at least one object.
-        seed: of the chance rows.
+        seed: of the chance rows and of what is tried again.
+        retried: how many tries are made once more.
     """
     success = np.concatenate([one.success for one in labels])
     graspable = np.any(success, axis=1)
@@ -107,7 +115,25 @@ def statistics(labels: Sequence[Labels], seed: int) -> dict[str, Any]:
         "graspable_points": _mean(graspable),
         "rings": _ring_statistics(success, graspable),
         "chance_deg": _chance(labels, np.random.default_rng(seed)),
+        "retried": _retried(labels, retried, np.random.default_rng((seed, 1))),
     }
+
+
+def _retried(labels: Sequence[Labels], count: int, rng: np.random.Generator) -> dict[str, int]:
+    """How many tries, half of them successes as far as there are any, end again as they did."""
+    made = again = 0
+    tries = [one.success for one in labels]
+    for bit in (True, False):
+        where = np.concatenate(
+            [np.insert(np.argwhere(t == bit), 0, i, axis=1) for i, t in enumerate(tries)]
+        )
+        for index, row, candidate in rng.permutation(where)[: count // 2]:
+            one = labels[index]
+            obj = catalog.load(one.object_id)
+            q, poses = one.tries(obj, row)
+            trial = try_grasp(obj, q, int(one.part[row]), poses[candidate])
+            made, again = made + 1, again + (trial.success == bit)
+    return {"tries": made, "same": again}
 
 
 def _ring_statistics(
@@ -183,6 +209,8 @@ def statistics_table(labels: dict[str, dict[str, Any]]) -> Table:
     for ring, (tilt_deg, _) in enumerate(APPROACH_RINGS):
         shares = (100 * n["rings"][ring]["density_at_graspable_points"] for _, _, n in columns)
         table.add_row(f"  approach tilted {tilt_deg:.0f} deg, %", *(f"{s:.1f}" for s in shares))
+    same = (f"{n['retried']['same']} of {n['retried']['tries']}" for _, _, n in columns)
+    table.add_row("tried again, ended the same", *same)
     for name in CHANCE_ROWS:
         means = (n["chance_deg"][name]["mean"] for _, _, n in columns)
         table.add_row(f"chance {name}, deg", *(f"{mean:.1f}" for mean in means))
