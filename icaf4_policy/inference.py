@@ -205,6 +205,7 @@ class Perception:
         up_camera_hint: ArrayLike | None = None,
         exclude_mask: ArrayLike | None = None,
         *,
+        part: int | None = None,
         rng: np.random.Generator,
     ) -> tuple[Prediction, ObjectView]:
         """Finds the object on the table and predicts everything about it.
@@ -215,6 +216,7 @@ class Perception:
             intrinsics: (3, 3).
             up_camera_hint: rough upward direction in the camera frame, when known.
             exclude_mask: bool (H, W), pixels of the robot, when known.
+            part: as of ``predict``.
             rng: for the fits and the choice of points.
 
         Returns:
@@ -227,6 +229,7 @@ class Perception:
             self.point_features(view.points_camera, view.colors, rgb, intrinsics),
             R_level_camera,
             table_camera=view.table_camera,
+            part=part,
             rng=rng,
         )
         return prediction, view
@@ -256,6 +259,7 @@ class Perception:
         R_level_camera: ArrayLike,
         *,
         table_camera: ArrayLike | None = None,
+        part: int | None = None,
         rng: np.random.Generator,
     ) -> Prediction:
         """Predicts everything about an object from its points.
@@ -265,14 +269,26 @@ class Perception:
             colors: uint8 (M, 3), or descriptors (M, C) for a network that is given those.
             R_level_camera: (3, 3).
             table_camera: (3,), a point of the table, which the hand keeps out of.
+            part: index of the part to be moved, when known: grasps are proposed on it alone, it has
+                a joint, and if it is the likeliest part of hardly any point, the points likeliest
+                to be of it are taken for it.
             rng: for the fits and the choice of points.
+
+        Raises:
+            InvalidArgumentError: too few points, features of another network, or a part that the
+                network does not know.
         """
+        num_parts = self.model.config.num_parts
+        if part is not None and not 1 <= part < num_parts:
+            raise InvalidArgumentError(
+                f"part={part}: the network knows the movable parts 1 to {num_parts - 1}."
+            )
         outputs, points, pick = self._look(
-            points_camera, colors, R_level_camera, rng, self.proposals.points
+            points_camera, colors, R_level_camera, rng, self.proposals.points, part
         )
         R_level_camera = np.asarray(R_level_camera, dtype=float)
         table = None if table_camera is None else np.asarray(table_camera, dtype=float)
-        return self._prediction(outputs, points, pick, R_level_camera, table, rng)
+        return self._prediction(outputs, points, pick, R_level_camera, table, part, rng)
 
     @torch.inference_mode()
     def point_grasps(
@@ -310,6 +326,7 @@ class Perception:
         R_level_camera: ArrayLike,
         rng: np.random.Generator,
         grasp_points: int,
+        part: int | None = None,
     ) -> tuple[Outputs, Array, NDArray[np.int64]]:
         """The network's outputs, the points it saw (N, 3), and which of the given they are."""
         points_camera, colors = np.asarray(points_camera, dtype=float), np.asarray(colors)
@@ -332,6 +349,7 @@ class Perception:
             torch.from_numpy(colors[pick][None].astype(np.float32) / 255.0),
             self._index,
             min(grasp_points, config.num_points),
+            part=part,
         )
         return outputs, points_camera[pick], pick
 
@@ -342,11 +360,15 @@ class Perception:
         pick: NDArray[np.int64],
         R_level_camera: Array,
         table_camera: Array | None,
+        wanted: int | None,
         rng: np.random.Generator,
     ) -> Prediction:
         num_parts = self.model.config.num_parts
         part_probability = outputs.segmentation[0].softmax(dim=-1).numpy().astype(float)
         part = part_probability.argmax(axis=-1)
+        if wanted is not None and (part == wanted).sum() < MIN_PART_POINTS:
+            likely = np.argsort(-part_probability[:, wanted], kind="stable")
+            part[likely[:MIN_PART_POINTS]] = wanted
         rows = np.arange(len(points))
         npcs = outputs.npcs[0].numpy()[rows, part].astype(float)
         naocs = outputs.naocs[0].numpy()[rows, part].astype(float)
@@ -369,6 +391,7 @@ class Perception:
                     points[on_part] + offset_camera[on_part],
                     points[on_part],
                     part_probability[on_part, k],
+                    moves=k == wanted,
                 )
             )
         up_camera = R_level_camera[2] if self.model.config.upright else None
@@ -385,7 +408,12 @@ class Perception:
             object_boxes=self._boxes(naocs, points, part, joints, up_camera, rng),
             joints=tuple(joints),
             grasps=self._ranked_grasps(
-                outputs, points, part, affordance, R_level_camera, table_camera
+                outputs,
+                points,
+                part if wanted is None else np.full_like(part, wanted),
+                affordance if wanted is None else affordance * part_probability[:, wanted],
+                R_level_camera,
+                table_camera,
             ),
             R_level_camera=R_level_camera,
         )
@@ -423,14 +451,17 @@ class Perception:
         outputs: Outputs,
         points: Array,
         part: NDArray[np.int64],
-        affordance: Array,
+        worth: Array,
         R_level_camera: Array,
         table_camera: Array | None,
     ) -> Grasps:
-        """Scores every (point, anchor) pair and keeps the best that differ and are free."""
+        """Scores every (point, anchor) pair and keeps the best that differ and are free.
+
+        ``worth`` (N,) is the probability that a point is one to grasp.
+        """
         asked = outputs.grasp_points[0].numpy()  # (S,)
         anchors = anchors_from_config(self.model.config.anchors)
-        scores = affordance[asked, None] * outputs.anchors[0].sigmoid().numpy()  # (S, L)
+        scores = worth[asked, None] * outputs.anchors[0].sigmoid().numpy()  # (S, L)
         # Some tens of candidates for each proposal leave enough after thinning.
         wanted = min(32 * self.proposals.count, scores.size)
         keep = np.argpartition(-scores, wanted - 1, axis=None)[:wanted]
@@ -500,7 +531,7 @@ def _weighted_median(values: Array, weights: Array) -> Array:
 
 
 def _joint_from_votes(
-    type_log: Array, axes: Array, pivots: Array, points: Array, weights: Array
+    type_log: Array, axes: Array, pivots: Array, points: Array, weights: Array, *, moves: bool
 ) -> JointEstimate:
     """One joint from the votes of a part's points.
 
@@ -513,8 +544,12 @@ def _joint_from_votes(
         pivots: (n, 3), nearest points of the axis, camera frame, metres.
         points: (n, 3), camera frame, metres.
         weights: (n,), probability that each point is on the part.
+        moves: whether the part is known to have a joint.
     """
-    joint_type = int(np.argmax((weights[:, None] * type_log).sum(axis=0))) + JOINT_NONE
+    votes = (weights[:, None] * type_log).sum(axis=0)
+    if moves:
+        votes[0] = -np.inf
+    joint_type = int(np.argmax(votes)) + JOINT_NONE
     if joint_type == JOINT_NONE:
         return _NO_JOINT
     units = axes / np.maximum(np.linalg.norm(axes, axis=-1, keepdims=True), 1e-9)

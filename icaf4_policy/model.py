@@ -149,6 +149,7 @@ class Icaf4(nn.Module):
         category: Tensor,
         grasp_points: Tensor | int | None = None,
         *,
+        part: int | None = None,
         asked: int | None = None,
     ) -> Outputs:
         """One pass over a batch of clouds.
@@ -159,6 +160,7 @@ class Icaf4(nn.Module):
             category: int64 (B,), into ``config.categories``.
             grasp_points: the points whose grasps are wanted: int64 (B, S), or how many of the
                 points of highest affordance; all when left out.
+            part: where it is given, those most likely to be of this part and graspable.
             asked: of each cloud the first so many points are asked about, the others being their
                 surroundings; all when left out.
         """
@@ -175,11 +177,14 @@ class Icaf4(nn.Module):
         # (B, asked, C)
         features: Tensor = self.backbone(points_level / unit, torch.cat(given, dim=-1), asked=asked)
         affordance: Tensor = self.affordance(features)
+        segmentation: Tensor = self.segmentation(features)
         if grasp_points is None:
             grasp_points = features.shape[1]
         if isinstance(grasp_points, int):
-            margin = affordance[..., 1] - affordance[..., 0]
-            grasp_points = margin.topk(grasp_points, dim=1).indices
+            worth = affordance[..., 1] - affordance[..., 0]
+            if part is not None:
+                worth = F.logsigmoid(worth) + segmentation.log_softmax(dim=-1)[..., part]
+            grasp_points = worth.topk(grasp_points, dim=1).indices
         anchors, residuals = self.grasp(
             torch.take_along_dim(features, grasp_points[..., None], dim=1)
         )
@@ -187,7 +192,7 @@ class Icaf4(nn.Module):
         joint_type, joint_axis, joint_offset = self.joint(features)
         return Outputs(
             unit=unit,
-            segmentation=self.segmentation(features),
+            segmentation=segmentation,
             npcs=npcs,
             naocs=naocs,
             affordance=affordance,

@@ -86,6 +86,7 @@ class Icaf4Policy:
                 frame.intrinsics,
                 up_camera_hint=frame.T_world_camera[2, :3],
                 exclude_mask=hand_mask(frame),
+                part=frame.target_part,
                 rng=self._rng,
             )
         except InvalidArgumentError:

@@ -217,8 +217,9 @@ class DrawConfig:
 
     Attributes:
         num_points: N.
-        learn_points: P, the points of each cloud that are learnt, at most N: those whose affordance
-            is known, up to half, and others; the rest are their surroundings. None for all.
+        learn_points: P, the points of each cloud that are learnt, at most N: up to half those where
+            grasps were tried or whose affordance is known all the same, in this order, and others;
+            the rest are their surroundings. None for all.
         num_anchors: L.
         num_grasp_points: S.
         negative_share: share of S given to points where every try failed.
@@ -308,9 +309,11 @@ def _learnt_first(
 ) -> NDArray[np.int64]:
     """The same points, those to be learnt first; see ``DrawConfig.learn_points``."""
     shuffled = rng.permutation(pick)
-    known = np.flatnonzero(targets.affordance[shuffled] != AFFORDANCE_UNKNOWN)[: count // 2]
-    others = np.delete(shuffled, known)
-    return np.concatenate([shuffled[known], others])
+    tried = targets.grasp_row[shuffled] >= 0
+    known = targets.affordance[shuffled] != AFFORDANCE_UNKNOWN
+    # Few points of a movable part were tried, and all of the base are known to offer nothing.
+    first = np.concatenate([np.flatnonzero(tried), np.flatnonzero(known & ~tried)])[: count // 2]
+    return np.concatenate([shuffled[first], np.delete(shuffled, first)])
 
 
 #: What of an item is about its grasps: the fields of ``GraspTargets`` without ``anchor_mask``.

@@ -1,8 +1,10 @@
+import copy
 import dataclasses
 import json
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, JOINT_NONE
@@ -12,7 +14,13 @@ from icaf4_policy import cli
 from icaf4_policy.checkpoint import save_model
 from icaf4_policy.drawing import read_rgb
 from icaf4_policy.evaluation import evaluate_grasps, evaluate_sample
-from icaf4_policy.inference import Perception, ProposalConfig, _joint_from_votes, diverse
+from icaf4_policy.inference import (
+    MIN_PART_POINTS,
+    Perception,
+    ProposalConfig,
+    _joint_from_votes,
+    diverse,
+)
 from icaf4_policy.joint_consistency import consistent_fits
 from icaf4_policy.tabletop import fit_table, segment_object
 from tests.icaf4_policy.toy import toy_network, toy_picture
@@ -116,6 +124,32 @@ def test_prediction_is_complete_and_repeatable(perception, picture):
     assert set(grasps.of_part(1).parts) <= {1}
 
 
+def test_a_part_that_is_known_to_be_there_is_found(perception, sample):
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    asked = perception.predict(*seen, part=1, rng=rng())
+    assert set(asked.grasps.parts) == {1}
+    assert (np.diff(asked.grasps.scores) <= 0).all()
+
+    blind = copy.deepcopy(perception.model)
+    with torch.no_grad():
+        list(blind.segmentation.parameters())[-1][0] += 100.0
+    blinded = dataclasses.replace(perception, model=blind)
+    overlooked = blinded.predict(*seen, rng=rng())
+    assert overlooked.part_boxes[1] is None
+    assert overlooked.joints[1].joint_type == JOINT_NONE
+    found = blinded.predict(*seen, part=1, rng=rng())
+    assert (found.part == 1).sum() == MIN_PART_POINTS
+    assert found.part_boxes[1] is not None
+    assert found.joints[1].joint_type != JOINT_NONE
+
+
+@pytest.mark.parametrize("part", [-1, 0, 2])
+def test_a_part_that_does_not_move_is_refused(perception, sample, part):
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    with pytest.raises(InvalidArgumentError, match=f"part={part}: .* movable parts 1 to 1"):
+        perception.predict(*seen, part=part, rng=rng())
+
+
 def test_boxes_are_made_to_agree_with_the_joints_unless_told_not_to(perception, sample):
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
     agreed = perception.predict(*seen, rng=rng())
@@ -189,12 +223,13 @@ def test_joint_votes_survive_outliers():
     pivots = pivot + generator.normal(scale=0.02, size=(100, 1)) * axis
     axes[:30], pivots[:30] = generator.normal(size=(30, 3)), generator.normal(size=(30, 3))
     type_log = np.log(np.tile([0.1, 0.1, 0.8], (100, 1)))
-    joint = _joint_from_votes(type_log, axes, pivots, pivots, np.ones(100))
+    joint = _joint_from_votes(type_log, axes, pivots, pivots, np.ones(100), moves=False)
     assert joint.joint_type == 1
     assert np.degrees(np.arccos(min(joint.axis_camera @ axis, 1.0))) < 3
     assert np.linalg.norm(np.cross(joint.pivot_camera - pivot, axis)) < 0.02
-    fixed = _joint_from_votes(type_log[:, ::-1], axes, pivots, pivots, np.ones(100))
-    assert fixed.joint_type == JOINT_NONE
+    votes = (type_log[:, ::-1], axes, pivots, pivots, np.ones(100))
+    assert _joint_from_votes(*votes, moves=False).joint_type == JOINT_NONE
+    assert _joint_from_votes(*votes, moves=True).joint_type != JOINT_NONE
 
 
 def test_evaluation_gives_every_metric(perception, sample):

@@ -139,6 +139,8 @@ def test_learnt_points_come_first_and_keep_their_surroundings():
         np.flatnonzero((targets.points_level == point).all(axis=1))[0]
         for point in item["points_level"][:120]
     ]
+    tried = targets.grasp_row[learnt] >= 0
+    assert tried[: min(60, int((targets.grasp_row >= 0).sum()))].all()
     np.testing.assert_array_equal(item["part"], targets.part[learnt])
     np.testing.assert_array_equal(item["npcs"], targets.npcs[learnt].astype(np.float32))
     assert item["grasp_points"].max() < 120
