@@ -27,7 +27,7 @@ MAX_JOINT_TURN = 0.1
 MAX_WIDTH = 0.08
 
 Phase = Literal[
-    "hover", "standoff", "approach", "close", "move", "release", "retreat", "home", "idle"
+    "hover", "standoff", "approach", "close", "move", "hold", "release", "retreat", "home", "idle"
 ]
 
 
@@ -41,6 +41,8 @@ class GraspPlan:
         axis_world: unit direction; opening is positive.
         pivot_world: a point of the axis, metres.
         displacement: how far to go along the joint, metres or radians.
+        hold_from: a motion that comes to its end after so much of it, by the end of the part's
+            range or whatever else is in the way, ends in holding on; else the hand lets go.
     """
 
     T_world_tcp: Array
@@ -48,6 +50,7 @@ class GraspPlan:
     axis_world: Array
     pivot_world: Array
     displacement: float
+    hold_from: float = np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +86,8 @@ class GraspExecutor:
     """Turns a plan into actions, one a control step.
 
     ``phase`` is "idle" before a plan is given and after one has ended, whether by the end of the
-    part's range or by jaws that came back empty: only a new look can tell.
+    part's range or by jaws that came back empty: only a new look can tell. It stays "hold" where
+    the plan says so.
     """
 
     def __init__(self, config: ExecutorConfig = ExecutorConfig()) -> None:
@@ -96,6 +100,11 @@ class GraspExecutor:
         self._moved = 0.0
         self._T_grasped = np.eye(4)
         self._T_home: Array | None = None
+
+    @property
+    def moved(self) -> float:
+        """How far the last plan came along its joint, metres or radians."""
+        return self._moved
 
     def begin(self, plan: GraspPlan) -> None:
         """Starts a new plan."""
@@ -110,7 +119,7 @@ class GraspExecutor:
         self._switch_phase(T_world_tcp, width)
         if self.phase == "idle" or self._plan is None:
             return np.zeros(7, dtype=np.float32)
-        closed = self.phase in ("close", "move")
+        closed = self.phase in ("close", "move", "hold")
         return action_towards(self._goal(T_world_tcp), T_world_tcp, 0.0 if closed else MAX_WIDTH)
 
     def _enter(self, phase: Phase) -> None:
@@ -191,8 +200,8 @@ class GraspExecutor:
             self._moved = min(self._moved + 0.8 * MAX_TRANSLATION / lever, plan.displacement)
             self._waited = 0
         elif self._waited > config.patience:
-            # Held back: at the end of the range, or by a wrong joint.
-            self._enter("release")
+            # Held back: at the end of the range, by a wrong joint, or by what is in the way.
+            self._enter("hold" if self._moved >= plan.hold_from else "release")
 
 
 def pose_gap(T_a: Array, T_b: Array) -> tuple[float, float]:

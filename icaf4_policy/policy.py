@@ -2,6 +2,9 @@
 
 A policy is given observations of ``ArtOpen-v0`` in the mode "rgbd" and nothing else: the picture,
 the camera, the hand's own pose and width, and the index of the part to move.
+
+A part that was moved and is found back where it was has fallen, or was pushed by the hand on its
+way out: the next time it is held.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from artgym.geometry import transforms
 from artgym.geometry.camera import points_from_depth
 from artgym.geometry.grasps import T_GRASP_TCP
 from artgym.geometry.rotations import frame_from_z, grasp_angle
+from artgym.geometry.screw import joint_motion
 from icaf4_policy.inference import Perception, Prediction
 from icaf4_policy.shipped import weights_path
 
@@ -33,6 +37,11 @@ _HAND_MIDDLE = np.array([0.0, 0.0, -0.08])
 
 #: Farther than any part moves: the end of the range ends the motion. Metres, radians.
 _FULL_SLIDE, _FULL_TURN = 0.5, 2.6
+
+#: A part that shall have moved by less, metres, may as well have stayed: twice what a hand may lag.
+_LEAST_MOVE = 0.06
+#: It is held from this share of the way on after which it went back.
+_HELD_SHARE = 0.8
 
 #: A proposal this near to one that failed (metres, radians) is passed over.
 _SAME_POSITION, _SAME_ANGLE = 0.015, float(np.radians(20.0))
@@ -66,6 +75,9 @@ class Icaf4Policy:
         self._rng = np.random.default_rng(seed)
         self._executor = GraspExecutor(ExecutorConfig(goes_home=True))
         self._tried: list[Array] = []
+        self._hold_from = np.inf
+        #: The last plan, and where the part's middle was when it was made.
+        self._last: tuple[GraspPlan, Array] | None = None
 
     def act(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
         """The next action (7,); looks and plans whenever nothing is under way."""
@@ -99,15 +111,33 @@ class Icaf4Policy:
         T_grasps = frame.T_world_camera @ grasps_camera
         T_world_grasp = next((T for T in T_grasps if not self._was_tried(T)), T_grasps[0])
         self._tried.append(T_world_grasp)
+        points_camera = self.prediction.points_camera[self.prediction.part == frame.target_part]
+        middle = transforms.apply(frame.T_world_camera, np.median(points_camera, axis=0)[None])[0]
+        self._learn_from_last(middle)
         revolute = joint.joint_type == JOINT_REVOLUTE
         pivot = transforms.apply(frame.T_world_camera, joint.pivot_camera[None])[0]
-        return GraspPlan(
+        plan = GraspPlan(
             T_world_tcp=T_world_grasp @ T_GRASP_TCP,
             joint_type="revolute" if revolute else "prismatic",
             axis_world=frame.T_world_camera[:3, :3] @ joint.axis_camera,
             pivot_world=pivot,
             displacement=_FULL_TURN if revolute else _FULL_SLIDE,
+            hold_from=self._hold_from,
         )
+        self._last = plan, middle
+        return plan
+
+    def _learn_from_last(self, middle: Array) -> None:
+        """Whether the part, whose middle (3,) is now there, went back after the last plan."""
+        if self._last is None:
+            return
+        plan, before = self._last
+        came = self._executor.moved
+        motion = joint_motion(plan.joint_type, plan.axis_world, plan.pivot_world, came)
+        after = transforms.apply(motion, before[None])[0]
+        moved = float(np.linalg.norm(after - before))
+        if moved > _LEAST_MOVE and np.linalg.norm(middle - before) < 0.5 * moved:
+            self._hold_from = min(self._hold_from, _HELD_SHARE * came)
 
     def _proposals(self, prediction: Prediction, frame: CameraFrame) -> Array:
         """``Ts_camera_grasp`` (J, 4, 4) on the target part, best first."""

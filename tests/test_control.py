@@ -23,7 +23,7 @@ START = transform_from(np.diag([1.0, -1.0, -1.0]), [0.1, 0.0, 0.65])
 GRASP = transform_from(frame_from_z([-1.0, 0.0, 0.0], 0.3), [0.2, 0.05, 0.2])
 
 
-def plan(joint_type="prismatic", displacement=0.2):
+def plan(joint_type="prismatic", displacement=0.2, hold_from=np.inf):
     axis = [1.0, 0.0, 0.0] if joint_type == "prismatic" else [0.0, -1.0, 0.0]
     return GraspPlan(
         T_world_tcp=GRASP,
@@ -31,6 +31,7 @@ def plan(joint_type="prismatic", displacement=0.2):
         axis_world=np.array(axis),
         pivot_world=np.array([-0.1, 0.0, 0.02]),
         displacement=displacement,
+        hold_from=hold_from,
     )
 
 
@@ -100,6 +101,21 @@ def test_end_of_the_range_ends_the_motion():
     poses, phases = run(executor, held_width=0.01, limit=0.3)
     assert phases[-1] == "idle"
     assert poses[:, 0, 3].max() < 0.4
+
+
+def test_holds_on_where_the_plan_says_so():
+    executor = GraspExecutor()
+    executor.begin(plan(displacement=0.5, hold_from=0.05))
+    poses, phases = run(executor, held_width=0.01, limit=0.3)
+    assert executor.moved > 0.05
+    assert phases[-1] == "hold"
+    np.testing.assert_allclose(executor.action(poses[-1], 0.01), [0, 0, 0, 0, 0, 0, -1])
+
+    executor.begin(plan(displacement=0.5, hold_from=0.4))
+    assert executor.moved == 0.0
+    _, phases = run(executor, held_width=0.01, limit=0.3)
+    assert executor.moved < 0.4
+    assert phases[-1] == "idle"
 
 
 def test_idle_executor_does_nothing():
