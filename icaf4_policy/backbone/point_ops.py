@@ -16,12 +16,12 @@ from torch import Tensor
 
 from artgym.errors import InvalidArgumentError
 
-#: Distances as plain float32 arithmetic gives them, without fused products: where two neighbours
-#: are all but equally far, their order is then the one that torch finds.
+#: Distances as plain float32 arithmetic gives them, without fused products: where two points are
+#: all but equally far, their order is then the one that torch finds, on any processor.
 _EXACT = {"nnan", "ninf", "nsz"}
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, fastmath=_EXACT)
 def farthest_points(points: NDArray[np.float32], count: int) -> NDArray[np.int64]:
     """Indices (count,) of a farthest-point sample of ``points`` (n, 3).
 

@@ -28,6 +28,19 @@ def test_farthest_points_against_a_plain_loop(cloud):
     np.testing.assert_array_equal(farthest_points(cloud, 40), chosen)
 
 
+def test_farthest_points_that_are_all_but_equally_far_are_those_of_plain_arithmetic():
+    steps = np.random.default_rng(0).integers(-4, 5, (600, 3)).astype(np.float32)
+    cloud = steps * np.float32(0.1) + np.float32(0.03)
+    nearest, chosen = np.full(600, np.inf, np.float32), []
+    found = farthest_points(cloud, 200)
+    for _ in range(200):
+        chosen.append(int(nearest.argmax()) if chosen else int(found[0]))
+        offset = cloud - cloud[chosen[-1]]
+        squares = offset[:, 0] ** 2 + offset[:, 1] ** 2 + offset[:, 2] ** 2
+        nearest = np.minimum(nearest, squares)
+    np.testing.assert_array_equal(found, chosen)
+
+
 def test_ball_query_against_sorting(cloud):
     centers = cloud[:50]
     found = ball_query(cloud, centers, 0.6, 8)
