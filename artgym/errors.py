@@ -21,6 +21,10 @@ class InvalidArgumentError(ArtgymError, ValueError):
     """A caller passed a value that cannot be used; the message names the argument."""
 
 
+class NothingSeenError(InvalidArgumentError):
+    """A picture shows no table, or nothing that stands on it: another one may."""
+
+
 class UnknownNameError(InvalidArgumentError):
     """A name that is not in a table.
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from artgym.control import ExecutorConfig, GraspExecutor, GraspPlan
 from artgym.datasets.frame import CameraFrame
 from artgym.datasets.sample import JOINT_REVOLUTE
-from artgym.errors import InvalidArgumentError
+from artgym.errors import NothingSeenError
 from artgym.geometry import transforms
 from artgym.geometry.camera import points_from_depth
 from artgym.geometry.grasps import T_GRASP_TCP
@@ -101,8 +101,8 @@ class Icaf4Policy:
                 part=frame.target_part,
                 rng=self._rng,
             )
-        except InvalidArgumentError:
-            # Nothing stands out above the table: the hand may hide it. Look again next step.
+        except NothingSeenError:
+            # The hand may hide what there is. Look again next step.
             return None
         joint = self.prediction.joints[frame.target_part]
         grasps_camera = self._proposals(self.prediction, frame)

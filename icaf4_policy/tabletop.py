@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-from artgym.errors import InvalidArgumentError
+from artgym.errors import InvalidArgumentError, NothingSeenError
 from artgym.geometry.camera import points_from_depth
 
 Array = NDArray[np.floating]
@@ -77,11 +77,11 @@ def fit_table(
         The upward unit normal (3,), towards the camera, and a point of the plane (3,).
 
     Raises:
-        InvalidArgumentError: no plane fits the hint.
+        NothingSeenError: no plane fits the hint.
     """
     points = np.asarray(points_camera, dtype=float)
     if len(points) < 100:
-        raise InvalidArgumentError(
+        raise NothingSeenError(
             f"depth has {len(points)} valid pixels: expected at least 100 to see a table."
         )
     points = points[rng.choice(len(points), min(len(points), 3000), replace=False)]
@@ -114,7 +114,7 @@ def _ransac_plane(
         aligned = normals @ (hint / np.linalg.norm(hint)) > np.cos(HINT_TOLERANCE)
         normals, origins = normals[aligned], origins[aligned]
     if not len(normals):
-        raise InvalidArgumentError(
+        raise NothingSeenError(
             "no plane in the depth image agrees with up_camera_hint. Check the sign of the hint "
             "(it points up, away from the table, in the camera frame), or leave it out."
         )
@@ -151,7 +151,8 @@ def segment_object(
         rng: for the plane fit.
 
     Raises:
-        InvalidArgumentError: shapes do not agree, no table, or nothing stands on it.
+        InvalidArgumentError: shapes do not agree.
+        NothingSeenError: no table, or nothing stands on it.
     """
     depth = np.asarray(depth, dtype=float)
     rgb = np.asarray(rgb)
@@ -173,7 +174,7 @@ def segment_object(
     above = seen & ((points - origin) @ normal > HEIGHT_ABOVE_TABLE)
     mask = _central_object(above, points)
     if mask.sum() < MIN_OBJECT_POINTS:
-        raise InvalidArgumentError(
+        raise NothingSeenError(
             f"only {int(mask.sum())} pixels stand out above the table: expected at least "
             f"{MIN_OBJECT_POINTS}. Bring the object into the middle of the image."
         )

@@ -8,7 +8,7 @@ import torch
 from PIL import Image
 
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, JOINT_NONE
-from artgym.errors import InvalidArgumentError
+from artgym.errors import InvalidArgumentError, NothingSeenError
 from artgym.geometry.rotations import grasp_angle, matrix_from_axis_angle
 from icaf4_policy import cli
 from icaf4_policy.checkpoint import save_model
@@ -57,7 +57,7 @@ def test_table_is_found_among_outliers():
     normal, origin = fit_table(points, generator)
     assert np.degrees(np.arccos(min(normal @ up, 1))) < 0.5
     assert abs((origin - [0, 0, 1.0]) @ up) < 1e-3
-    with pytest.raises(InvalidArgumentError, match="up_camera_hint"):
+    with pytest.raises(NothingSeenError, match="up_camera_hint"):
         fit_table(points, generator, -up)
 
 
@@ -100,7 +100,7 @@ def test_empty_table_is_refused(picture, sample):
 
 
 def test_blind_camera_is_refused(picture):
-    with pytest.raises(InvalidArgumentError, match="0 valid pixels"):
+    with pytest.raises(NothingSeenError, match="0 valid pixels"):
         segment_object(np.zeros_like(picture.depth), picture.intrinsics, picture.rgb, rng=rng())
 
 

@@ -9,10 +9,12 @@ import pytest
 
 from artgym.control import MAX_ROTATION, MAX_TRANSLATION
 from artgym.datasets.sample import JOINT_PRISMATIC
+from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
 from artgym.geometry.transforms import transform_from
-from icaf4_policy.inference import Grasps, JointEstimate
+from icaf4_policy.inference import Grasps, JointEstimate, Perception
 from icaf4_policy.policy import Icaf4Policy
+from tests.icaf4_policy.toy import toy_network
 
 #: The end of the way of a part that slides along x, metres.
 LIMIT = 0.15
@@ -82,6 +84,23 @@ def test_a_part_that_went_back_is_held_the_next_time(springs_back):
     assert phases.index("release") > phases.index("move")
     assert (phases[-1] == "hold") == springs_back
     assert seen.slid == pytest.approx(LIMIT)
+
+
+def test_a_picture_of_nothing_is_waited_out_and_a_wrong_one_is_not():
+    observation = {
+        "rgb": np.zeros((40, 40, 3), np.uint8),
+        "depth": np.zeros(1600, np.float32),
+        "intrinsics": np.array([40.0, 0, 20, 0, 40, 20, 0, 0, 1]),
+        "T_world_camera": np.eye(4).ravel(),
+        "T_world_tcp": np.eye(4).ravel(),
+        "jaw_width": np.array([0.08]),
+        "target_part": 1,
+    }
+    policy = Icaf4Policy(Perception(model=toy_network(), category="toy"))
+    np.testing.assert_array_equal(policy.act(observation), np.zeros(7))
+    observation["rgb"] = observation["rgb"].astype(np.float32)
+    with pytest.raises(InvalidArgumentError, match="uint8"):
+        policy.act(observation)
 
 
 def test_a_new_episode_begins_without_memory():
