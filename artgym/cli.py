@@ -293,6 +293,7 @@ def generate(
     camera_size: tuple[int, int] = (640, 480),
     depth_noise: bool = False,
     label_radius_mm: float = 3.0,
+    brink_grasps: bool = False,
     seed: int = 0,
     workers: int = 1,
     backend: Literal["loky", "dask", "ray"] = "loky",
@@ -314,6 +315,9 @@ def generate(
         depth_noise: give depth the errors of a real sensor.
         label_radius_mm: how far a labelled point speaks for the points around it; farther, more of
             a picture is labelled, and less surely.
+        brink_grasps: points whose successes would fail a few millimetres beside are told them all
+            the same, instead of counting as unknown: for training, where a knob that can be
+            gripped in no other way shall not seem useless.
         seed: of views, lights and placements.
         workers: processes; any number gives the same bytes.
         backend: loky for processes of this machine, or a cluster's dask or ray.
@@ -331,6 +335,7 @@ def generate(
         camera_size=camera_size,
         depth_noise=depth_noise,
         label_radius=label_radius_mm / 1000.0,
+        brink_grasps=brink_grasps,
         seed=seed,
     )
     counts: dict[str, int] = dict(zip(("train", "val", "test"), scenes, strict=True))

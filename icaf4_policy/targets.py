@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from artgym.datasets.sample import (
+    AFFORDANCE_NO,
     AFFORDANCE_UNKNOWN,
     AFFORDANCE_YES,
     JOINT_NONE,
@@ -270,7 +271,7 @@ def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) ->
 
     affordance, row = targets.affordance[learnt], targets.grasp_row[learnt]
     good = rng.permutation(np.flatnonzero((affordance == AFFORDANCE_YES) & (row >= 0)))
-    bad = rng.permutation(np.flatnonzero((affordance != AFFORDANCE_YES) & (row >= 0)))
+    bad = rng.permutation(np.flatnonzero((affordance == AFFORDANCE_NO) & (row >= 0)))
     bad = bad[: int(config.negative_share * config.num_grasp_points)]
     good = good[: config.num_grasp_points - len(bad)]
     known = np.concatenate([good, bad])

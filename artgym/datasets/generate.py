@@ -86,6 +86,9 @@ class GenerationConfig:
         label_margin: a success is carried to the points around only if the open hand, grown by
             this, touches nothing, metres, and if the rolls on either side of it succeed too: a
             grasp at its brink fails a few millimetres beside.
+        brink_grasps: whether a point with successes of that kind alone is told them all the same,
+            the steady ones if there are any. Else it counts as unknown: labels are surer, and what
+            can be grasped at the brink alone, as a knob close to its case, seems to offer nothing.
         depth_noise: whether depth has the errors of a real sensor (``datasets.depth_noise``).
         seed: of views, lights and placements.
     """
@@ -100,6 +103,7 @@ class GenerationConfig:
     label_radius: float = 0.003
     label_angle: float = 0.7
     label_margin: float = 0.003
+    brink_grasps: bool = False
     depth_noise: bool = False
     seed: int = 0
 
@@ -181,6 +185,8 @@ def _carried_labels(
             point, R = poses[:1, :3, 3], poses[None, tried, :3, :3]
             verdicts = judge(obj, q, int(labels.part[row]), point, R, strict)
             carried[i, tried] = verdicts[0] == Verdict.POSSIBLE
+        if config.brink_grasps and not carried[i].any():
+            carried[i] = steady[i] if len(tried) else success[i]
     affordance = np.where(success.any(axis=1), AFFORDANCE_UNKNOWN, AFFORDANCE_NO)
     return _CarriedLabels(
         points_part=labels.points_part[rows],

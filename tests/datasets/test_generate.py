@@ -229,6 +229,29 @@ def test_carried_successes_keep_clear_of_everything(samples, labels):
             assert verdict[0, 0] == Verdict.POSSIBLE
 
 
+def test_points_with_successes_at_the_brink_alone_are_told_them_on_request(samples, labels):
+    known = read_labels(samples[0].object_id, labels)
+    generous = make_pictures(
+        samples[0].object_id, dataclasses.replace(CONFIG, brink_grasps=True), labels
+    )
+    doubted = 0
+    for i, (sample, picture) in enumerate(zip(samples, generous, strict=True)):
+        (told,) = picture.samples
+        np.testing.assert_array_equal(told.grasp_row, sample.grasp_row)
+        success = known.success[known.state == i // CONFIG.views]
+        carried, everything = sample.successful_tries(), told.successful_tries()
+        assert not np.any(everything & ~success)
+        sure = carried.any(axis=1)
+        np.testing.assert_array_equal(everything[sure], carried[sure])
+        np.testing.assert_array_equal(everything.any(axis=1), success.any(axis=1))
+        row = told.grasp_row
+        labelled = row >= 0
+        expected = np.where(success.any(axis=1), AFFORDANCE_YES, AFFORDANCE_NO)
+        np.testing.assert_array_equal(told.affordance[labelled], expected[row[labelled]])
+        doubted += (sample.affordance[labelled] == AFFORDANCE_UNKNOWN).sum()
+    assert doubted > 0
+
+
 def test_an_object_without_labels_is_pictured_without_grasps(labels):
     pictures = make_pictures("drawer/1003", CONFIG, labels)
     states = joint_states("drawer/1003")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from artgym.datasets.sample import AFFORDANCE_UNKNOWN
+from artgym.datasets.sample import AFFORDANCE_NO, AFFORDANCE_UNKNOWN
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
@@ -144,6 +144,19 @@ def test_learnt_points_come_first_and_keep_their_surroundings():
     np.testing.assert_array_equal(item["part"], targets.part[learnt])
     np.testing.assert_array_equal(item["npcs"], targets.npcs[learnt].astype(np.float32))
     assert item["grasp_points"].max() < 120
+
+
+def test_a_point_whose_grasps_are_unknown_is_no_negative_of_the_anchors():
+    targets = targets_from_sample(toy_sample(0), ["toy"], anchors_from_config(AnchorConfig()), 2048)
+    weights = draw_item(targets, DRAW, np.random.default_rng(0))["grasp_weight"]
+    assert (weights == np.float32(DRAW.negative_weight)).any()
+    failed = (targets.grasp_row >= 0) & (targets.affordance == AFFORDANCE_NO)
+    doubted = dataclasses.replace(
+        targets,
+        affordance=np.where(failed, AFFORDANCE_UNKNOWN, targets.affordance).astype(np.uint8),
+    )
+    weights = draw_item(doubted, DRAW, np.random.default_rng(0))["grasp_weight"]
+    assert not (weights == np.float32(DRAW.negative_weight)).any()
 
 
 def test_order_of_points_does_not_matter(network):
