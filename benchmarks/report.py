@@ -249,8 +249,10 @@ def labels_block(result: Mapping[str, Any]) -> str:
         "|---|" + "---|" * (8 + len(tilts)),
     ]
     total: dict[str, int] = dict.fromkeys(("objects", "points", "tries", "trials", "successes"), 0)
+    retried = {"tries": 0, "same": 0}
     for category, splits in result["labels"].items():
         rows = list(splits.values())
+        retried = {name: retried[name] + sum(r["retried"][name] for r in rows) for name in retried}
         summed = {name: sum(row[name] for row in rows) for name in total}
         total = {name: total[name] + summed[name] for name in total}
         none = sum(row["objects_without_success"] for row in rows)
@@ -272,7 +274,10 @@ def labels_block(result: Mapping[str, Any]) -> str:
         f"{total['objects']} objects; {total['tries']:,} tries at {total['points']:,} points, of "
         f"which {total['trials']:,} were decided by physics and the others by the filter; "
         f"{total['successes']:,} succeed. Tilt is the angle of the approach from the inward "
-        "normal; below it the share of such tries that succeed.",
+        "normal; below it the share of such tries that succeed. Of "
+        f"{retried['tries']:,} tries made once more "
+        f"({result['hardware']['cpu']}), half of them successes, "
+        f"{retried['same']:,} ended the same.",
     ]
     return "\n".join(lines)
 
