@@ -73,8 +73,9 @@ class Grasps:
     Attributes:
         points_camera: (J, 3), metres, surface points.
         R_camera_grasp: (J, 3, 3), columns (x, y = closing, z = approach).
-        scores: (J,), probability that the point can be grasped times that of the anchor.
-        parts: int64 (J,), predicted part of the point.
+        scores: (J,), probability that the point can be grasped times that of the anchor, and times
+            that of the part where one was asked for.
+        parts: int64 (J,), predicted part of the point, or the one that was asked for.
     """
 
     points_camera: Array
