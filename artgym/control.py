@@ -103,7 +103,7 @@ class GraspExecutor:
 
     @property
     def moved(self) -> float:
-        """How far the last plan came along its joint, metres or radians."""
+        """How far the last plan asked the hand along its joint, which lags; metres or radians."""
         return self._moved
 
     def begin(self, plan: GraspPlan) -> None:
