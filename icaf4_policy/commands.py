@@ -41,7 +41,7 @@ def train(
     *,
     data: Path,
     out: Path,
-    scenes: Path | None = None,
+    scenes: tuple[Path, ...] = (),
     log: Path | None = None,
     device: str = "auto",
     threads: int = 1,
@@ -54,7 +54,7 @@ def train(
             one of the authors' with `{category}/train.txt` and the listed files, of one category,
             where every eighth object of the list chooses the weights.
         out: weights to write, ending in .safetensors.
-        scenes: folder with `train` and `val`, made by `artgym generate reartmix`, whose objects of
+        scenes: folders with `train` and `val`, made by `artgym generate reartmix`, whose objects of
             the categories are learnt too: turned anyhow and partly hidden.
         log: folder for TensorBoard.
         device: cpu, cuda, cuda:1, ...; auto takes a GPU if there is one. Several GPUs train several
@@ -85,7 +85,7 @@ def _usable(device: str) -> str:
 
 
 def _training_samples(
-    data: Path, scenes: Path | None, categories: Sequence[str], features: Features
+    data: Path, scenes: Sequence[Path], categories: Sequence[str], features: Features
 ) -> tuple[Samples, Samples]:
     """Those to train with, and those of other objects that choose the weights."""
     listed = [c for c in categories if (data / c / "train.txt").is_file()]
@@ -105,10 +105,10 @@ def _training_samples(
             "pictures to describe points by. Train with features 'color', or on what 'artgym "
             "generate' makes."
         )
-    if scenes is not None:
+    if scenes:
         raise InvalidArgumentError(
-            f"scenes={str(scenes)!r}: {data / listed[0]} holds the authors' data, which is trained "
-            "with alone."
+            f"scenes={', '.join(map(str, scenes))}: {data / listed[0]} holds the authors' data, "
+            "which is trained with alone."
         )
     samples = AuthorsFolder(data, listed[0], "train")
     numbers = [sample.urdf_id for sample in samples]
@@ -120,12 +120,12 @@ def _training_samples(
 
 
 def _split(
-    data: Path, scenes: Path | None, categories: Sequence[str], split: str, features: Features
+    data: Path, scenes: Sequence[Path], categories: Sequence[str], split: str, features: Features
 ) -> Iterator[Sample]:
     for category in categories:
         yield from _samples(data / category / split, features)
-    if scenes is not None:
-        yield from _samples(scenes / split, features, categories)
+    for folder in scenes:
+        yield from _samples(folder / split, features, categories)
 
 
 def _samples(

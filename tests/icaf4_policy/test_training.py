@@ -220,14 +220,16 @@ def test_scenes_add_their_objects_of_the_category(tmp_path, samples, capsys):
         ]
         for part in pictures
     ]
-    write_splits(tmp_path / "scenes", strange)
+    scenes = [tmp_path / "scenes", tmp_path / "more"]
+    for folder in scenes:
+        write_splits(folder, strange)
     weights = tmp_path / "toy.safetensors"
     arguments = ["train", "--category", "toy", "--data", str(tmp_path / "data")]
-    arguments += ["--scenes", str(tmp_path / "scenes"), "--out", str(weights), "--epochs", "1"]
+    arguments += ["--scenes", *map(str, scenes), "--out", str(weights), "--epochs", "1"]
     arguments += ["--num-points", "512", "--num-grasp-points", "32", "--batch-size", "2"]
     assert cli.main(arguments) == 0
     facts = load_model(weights)[1]["training"]
-    assert (facts["training_samples"], facts["validation_samples"]) == (3 + 1, 1 + 1)
+    assert (facts["training_samples"], facts["validation_samples"]) == (3 + 2, 1 + 2)
 
 
 @pytest.fixture
