@@ -315,9 +315,9 @@ def generate(
         depth_noise: give depth the errors of a real sensor.
         label_radius_mm: how far a labelled point speaks for the points around it; farther, more of
             a picture is labelled, and less surely.
-        brink_grasps: points whose successes would fail a few millimetres beside are told them all
-            the same, instead of counting as unknown: for training, where a knob that can be
-            gripped in no other way shall not seem useless.
+        brink_grasps: a part all of whose successes would fail a few millimetres beside is told
+            them all the same, instead of its points counting as unknown: for training, where a
+            knob that can be gripped in no other way shall not seem useless.
         seed: of views, lights and placements.
         workers: processes; any number gives the same bytes.
         backend: loky for processes of this machine, or a cluster's dask or ray.

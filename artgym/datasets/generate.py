@@ -86,9 +86,10 @@ class GenerationConfig:
         label_margin: a success is carried to the points around only if the open hand, grown by
             this, touches nothing, metres, and if the rolls on either side of it succeed too: a
             grasp at its brink fails a few millimetres beside.
-        brink_grasps: whether a point with successes of that kind alone is told them all the same,
-            the steady ones if there are any. Else it counts as unknown: labels are surer, and what
-            can be grasped at the brink alone, as a knob close to its case, seems to offer nothing.
+        brink_grasps: whether a part with successes of that kind alone is told them all the same, at
+            each point the steady ones if there are any. Else its points count as unknown: labels
+            are surer, and what can be grasped at the brink alone, as a knob close to its case,
+            seems to offer nothing.
         depth_noise: whether depth has the errors of a real sensor (``datasets.depth_noise``).
         seed: of views, lights and placements.
     """
@@ -185,8 +186,12 @@ def _carried_labels(
             point, R = poses[:1, :3, 3], poses[None, tried, :3, :3]
             verdicts = judge(obj, q, int(labels.part[row]), point, R, strict)
             carried[i, tried] = verdicts[0] == Verdict.POSSIBLE
-        if config.brink_grasps and not carried[i].any():
-            carried[i] = steady[i] if len(tried) else success[i]
+    if config.brink_grasps:
+        part = labels.part[rows]
+        for k in np.unique(part):
+            if not carried[part == k].any():
+                brink = np.where(steady.any(axis=1, keepdims=True), steady, success)
+                carried[part == k] = brink[part == k]
     affordance = np.where(success.any(axis=1), AFFORDANCE_UNKNOWN, AFFORDANCE_NO)
     return _CarriedLabels(
         points_part=labels.points_part[rows],
