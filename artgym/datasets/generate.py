@@ -187,11 +187,11 @@ def _carried_labels(
             verdicts = judge(obj, q, int(labels.part[row]), point, R, strict)
             carried[i, tried] = verdicts[0] == Verdict.POSSIBLE
     if config.brink_grasps:
-        part = labels.part[rows]
-        for k in np.unique(part):
-            if not carried[part == k].any():
-                brink = np.where(steady.any(axis=1, keepdims=True), steady, success)
-                carried[part == k] = brink[part == k]
+        brink = np.where(steady.any(axis=1, keepdims=True), steady, success)
+        for part in np.unique(labels.part[rows]):
+            here = labels.part[rows] == part
+            if not carried[here].any():
+                carried[here] = brink[here]
     affordance = np.where(success.any(axis=1), AFFORDANCE_UNKNOWN, AFFORDANCE_NO)
     return _CarriedLabels(
         points_part=labels.points_part[rows],
