@@ -21,7 +21,7 @@ from artgym.files import MANIFEST_NAME, file_sha256
 from benchmarks.grasp_heads import HeadKind, HeadTrainingConfig, train_heads
 from benchmarks.policies import load_perception
 from icaf4_policy.anchors import AnchorConfig
-from icaf4_policy.backbone.classical import Features, described
+from icaf4_policy.features import Features, described
 from icaf4_policy.training import TrainingConfig, train
 
 #: What each descriptor's row is called, and what it reads.

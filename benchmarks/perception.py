@@ -1,11 +1,11 @@
-"""The paper's tables: ``python -m benchmarks.perception table1|table2|table3 --help``."""
+"""The paper's tables, and choices: ``python -m benchmarks.perception table1|... --help``."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
 
-from benchmarks import anchor_table, object_table, scene_table
+from benchmarks import anchor_table, network_table, object_table, scene_table
 from benchmarks.command import run_named
 
 #: What can be printed: the functions take the command line that follows the word.
@@ -13,6 +13,7 @@ TABLES: Mapping[str, Callable[[Sequence[str]], int]] = {
     "table1": object_table.main,
     "table2": anchor_table.main,
     "table3": scene_table.main,
+    "networks": network_table.main,
 }
 
 

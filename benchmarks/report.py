@@ -432,6 +432,26 @@ def anchor_table_block(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def network_table_block(result: Mapping[str, Any]) -> str:
+    """A Markdown table of ``network_table.json``: the mean over categories, a choice a line."""
+    columns = result["columns"]
+    lines = _head(["", *(heading for heading, _ in columns.values()), "minutes"])
+    for row, values in result["metrics"]["mean"].items():
+        cells = [cell(values[name], decimals) for name, (_, decimals) in columns.items()]
+        seconds = result["training_seconds"][row]
+        minutes = "" if seconds is None else f"{seconds / 60:.0f}"
+        lines.append(_line([row.replace("_", " "), *cells, minutes]))
+    config = result["config"]
+    lines += [
+        "",
+        f"Means over {', '.join(config['category'])}; {sum(result['views'].values())} views of "
+        f"{config['split']} objects. Every row: {config['samples']} views a category, "
+        f"{config['epochs']} epochs, and one choice that is not the first row's. Minutes of one "
+        "core train all of a row's networks.",
+    ]
+    return "\n".join(lines)
+
+
 BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "success_rate": success_rate_block,
     "object_table": object_table_block,
@@ -445,6 +465,7 @@ BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "label_speed": label_speed_block,
     "pose_speed": pose_speed_block,
     "anchor_table": anchor_table_block,
+    "network_table": network_table_block,
     "rays": rays_block,
     "rl_baselines": rl_baselines_block,
 }
@@ -457,6 +478,7 @@ _COMMANDS = {
     "pose_speed": "speed poses",
     "object_table": "perception table1",
     "anchor_table": "perception table2",
+    "network_table": "perception networks",
     "scene_table": "perception table3",
 }
 

@@ -74,8 +74,8 @@ def score_views(task: ViewsTask) -> dict[str, list[dict[str, float]]]:
 def _score(
     perception: Any, picture: Picture, method: str, task: ViewsTask, number: int
 ) -> dict[str, float]:
-    from icaf4_policy.backbone.classical import described
     from icaf4_policy.evaluation import evaluate_sample
+    from icaf4_policy.features import described
 
     rng = np.random.default_rng([task.seed, zlib.crc32(task.object_id.encode()), number])
     (sample,) = picture.samples

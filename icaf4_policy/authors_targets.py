@@ -15,6 +15,7 @@ from artgym.datasets.sample import (
 from artgym.errors import DamagedFileError
 from icaf4_policy.anchors import Anchors
 from icaf4_policy.cloud import level_points
+from icaf4_policy.features import Features, point_inputs
 from icaf4_policy.pose_fitting import umeyama
 from icaf4_policy.targets import Targets
 
@@ -28,7 +29,9 @@ _R_LEVEL_CAMERA = level_from_camera([0.0, -1.0, 0.0])
 _GRAY = 128
 
 
-def targets_from_authors(sample: AuthorsSample, anchors: Anchors, max_points: int) -> Targets:
+def targets_from_authors(
+    sample: AuthorsSample, anchors: Anchors, max_points: int, features: Features = "color"
+) -> Targets:
     """Works out the targets of one of the authors' samples, of the network's first category.
 
     Each graspable point has its one grasp as target. Joints are brought from normalised
@@ -38,21 +41,23 @@ def targets_from_authors(sample: AuthorsSample, anchors: Anchors, max_points: in
         sample: one view.
         anchors: what grasps are matched with.
         max_points: of a longer cloud, this many points are kept, evenly in their order.
+        features: what the network is given of each point; no descriptors.
 
     Raises:
         DamagedFileError: too little is seen of the base to bring the joints to metres.
     """
-    points_level, _ = level_points(sample.points_camera, _R_LEVEL_CAMERA)
+    points_level, center_level = level_points(sample.points_camera, _R_LEVEL_CAMERA)
     total = len(points_level)
     keep = np.linspace(0, total - 1, min(total, max_points)).round().astype(int)
     graspable = np.flatnonzero(sample.affordance[keep] == AFFORDANCE_YES)
     R_level_grasps = _R_LEVEL_CAMERA @ sample.R_camera_grasps[keep[graspable]].astype(float)
     matched, residual = anchors.match(R_level_grasps)
     axis_level, pivot_level = _joints(sample, points_level)
+    gray = np.full((total, 3), _GRAY, dtype=np.uint8)
     return Targets(
         category=0,
         points_level=points_level[keep].astype(np.float32),
-        colors=np.full((len(keep), 3), _GRAY, dtype=np.uint8),
+        colors=point_inputs(points_level, gray, center_level, features, keep),
         part=sample.part[keep],
         npcs=sample.npcs[keep].astype(np.float16),
         naocs=sample.naocs[keep].astype(np.float16),

@@ -18,9 +18,10 @@ from artgym.datasets.picture_files import PictureFolder, SampleFolder
 from artgym.datasets.sample import Picture, Sample
 from artgym.errors import InvalidArgumentError
 from icaf4_policy import drawing
-from icaf4_policy.backbone.classical import Features, described
+from icaf4_policy.backbone.classical import DESCRIPTOR_CHANNELS
 from icaf4_policy.checkpoint import description_path
 from icaf4_policy.detector.config import DetectorTrainingConfig
+from icaf4_policy.features import Features, described
 from icaf4_policy.inference import Perception, Prediction
 from icaf4_policy.shipped import weights_path
 from icaf4_policy.training import TrainingConfig
@@ -99,10 +100,10 @@ def _training_samples(
             f"category={', '.join(categories)}: {data / listed[0]} holds the authors' data, which "
             "is trained with one category at a time."
         )
-    if features != "color":
+    if features in DESCRIPTOR_CHANNELS:
         raise InvalidArgumentError(
             f"features={features!r}: {data / listed[0]} holds the authors' data, which has no "
-            "pictures to describe points by. Train with features 'color', or on what 'artgym "
+            "pictures to describe points by. Train with other features, or on what 'artgym "
             "generate' makes."
         )
     if scenes:
@@ -136,7 +137,7 @@ def _samples(
     def wanted(sample: Sample) -> bool:
         return categories is None or sample.object_id.partition("/")[0] in categories
 
-    if features == "color":
+    if features not in DESCRIPTOR_CHANNELS:
         # Pictures take far longer to read than samples.
         yield from filter(wanted, SampleFolder(folder))
         return

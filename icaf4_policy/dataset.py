@@ -9,6 +9,7 @@ from torch.utils.data import Dataset, Sampler
 
 from artgym.datasets.sample import Sample
 from icaf4_policy.anchors import Anchors
+from icaf4_policy.features import Features
 from icaf4_policy.targets import DrawConfig, Item, Targets, draw_item, targets_from_sample
 
 #: Of a sample's points, at most this many times ``num_points`` are kept to draw from.
@@ -40,6 +41,7 @@ class TrainingItems(Dataset[Item]):
         categories: those that the network is for.
         anchors: what successful grasps are matched with.
         config: how points are chosen.
+        features: what the network is given of each point.
         seed: of the choice.
     """
 
@@ -50,10 +52,12 @@ class TrainingItems(Dataset[Item]):
         anchors: Anchors,
         config: DrawConfig,
         *,
+        features: Features = "color",
         seed: int = 0,
     ) -> None:
         self.config = config
         self._samples, self._categories = samples, categories
+        self._features: Features = features
         self._anchors, self._seed = anchors, seed
         self._targets: dict[int, Targets] = {}
 
@@ -72,6 +76,7 @@ class TrainingItems(Dataset[Item]):
                 self._categories,
                 self._anchors,
                 SPARE_POINTS * self.config.num_points,
+                self._features,
             )
         rng = np.random.default_rng((self._seed, epoch, number))
         return draw_item(self._targets[number], self.config, rng)

@@ -15,10 +15,10 @@ from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import anchors_from_config
-from icaf4_policy.backbone.classical import CHANNELS, point_features
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.collisions import CollisionConfig, hand_is_free
+from icaf4_policy.features import point_descriptors, point_inputs
 from icaf4_policy.joint_consistency import ConsistencyConfig, consistent_fits
 from icaf4_policy.model import Icaf4, Outputs
 from icaf4_policy.pose_fitting import PoseFit, fit_pose
@@ -250,7 +250,7 @@ class Perception:
             uint8 (M, C).
         """
         features = self.model.config.features
-        return point_features(points_camera, colors, rgb, intrinsics, features)
+        return point_descriptors(points_camera, colors, rgb, intrinsics, features)
 
     @torch.inference_mode()
     def predict(
@@ -337,17 +337,12 @@ class Perception:
                 f"{MIN_OBJECT_POINTS}."
             )
         config = self.model.config
-        expected = (len(points_camera), CHANNELS[config.features])
-        if colors.shape != expected:
-            raise InvalidArgumentError(
-                f"colors has shape {colors.shape}: expected {expected}, features "
-                f"{config.features!r} of each point."
-            )
-        points_level, _ = level_points(points_camera, R_level_camera)
+        points_level, center_level = level_points(points_camera, R_level_camera)
         pick = choose_points(len(points_camera), config.num_points, rng)
+        given = point_inputs(points_level, colors, center_level, config.features, pick)
         outputs = self.model(
             torch.from_numpy(points_level[pick][None].astype(np.float32)),
-            torch.from_numpy(colors[pick][None].astype(np.float32) / 255.0),
+            torch.from_numpy(given[None].astype(np.float32) / 255.0),
             self._index,
             min(grasp_points, config.num_points),
             part=part,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -15,6 +16,9 @@ from icaf4_policy.targets import Batch, GraspTargets
 
 #: Below this error, in NOCS and in network units, the smooth L1 losses are quadratic.
 _SMOOTH = 0.05
+
+#: What ``loss_terms`` may tell parts apart by.
+SegmentationLoss = Literal["cross_entropy", "soft_iou"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,13 +55,33 @@ def _coordinate_loss(predicted: Tensor, truth: Tensor, part: Tensor) -> Tensor:
     return F.smooth_l1_loss(own, truth, beta=_SMOOTH)
 
 
-def loss_terms(outputs: Outputs, batch: Batch) -> dict[str, Tensor]:
+def _soft_iou_loss(logits: Tensor, part: Tensor) -> Tensor:
+    """One minus the intersection over union of probabilities (B, N, K) and parts (B, N).
+
+    Mean over the parts that each cloud shows, and over clouds.
+    """
+    probability = logits.softmax(dim=-1)
+    truth = F.one_hot(part, logits.shape[-1]).to(logits.dtype)
+    shared = (probability * truth).sum(dim=1)  # (B, K)
+    either = (probability + truth).sum(dim=1) - shared
+    return 1.0 - _masked_mean(shared / either.clamp(min=1e-6), truth.sum(dim=1) > 0)
+
+
+def loss_terms(
+    outputs: Outputs, batch: Batch, segmentation: SegmentationLoss = "cross_entropy"
+) -> dict[str, Tensor]:
     """Every loss, unweighted, by the names of ``LossWeights``.
 
     Args:
         outputs: of the network, at ``batch.grasp_points``.
         batch: the truth.
+        segmentation: by what parts are told apart.
     """
+    told = (
+        _soft_iou_loss(outputs.segmentation, batch.part)
+        if segmentation == "soft_iou"
+        else F.cross_entropy(outputs.segmentation.transpose(1, 2), batch.part)
+    )
     revolute = batch.joint_type == JOINT_REVOLUTE - JOINT_NONE  # (B, N)
     movable = batch.joint_type > 0
     axis_error = (outputs.joint_axis - batch.joint_axis).square().sum(dim=-1)
@@ -73,7 +97,7 @@ def loss_terms(outputs: Outputs, batch: Batch) -> dict[str, Tensor]:
         reduction="none",
     )
     return {
-        "segmentation": F.cross_entropy(outputs.segmentation.transpose(1, 2), batch.part),
+        "segmentation": told,
         "npcs": _coordinate_loss(outputs.npcs, batch.npcs, batch.part),
         "naocs": _coordinate_loss(outputs.naocs, batch.naocs, batch.part),
         "affordance": _masked_mean(affordance_error, known),

@@ -11,8 +11,9 @@ from torch.nn import functional as F
 
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
-from icaf4_policy.backbone.classical import CHANNELS, Features, PointwiseBackbone
+from icaf4_policy.backbone.classical import DESCRIPTOR_CHANNELS, PointwiseBackbone
 from icaf4_policy.backbone.pointnet2 import BackboneConfig, PointNet2
+from icaf4_policy.features import CHANNELS, Features
 from icaf4_policy.heads.affordance import AffordanceHead
 from icaf4_policy.heads.grasp import GraspHead
 from icaf4_policy.heads.joint import JointHead
@@ -39,8 +40,8 @@ class ModelConfig:
         num_points: points of a cloud.
         anchors: what grasps are refined from.
         backbone: sizes of the backbone.
-        features: what is given of each point beside where it is; descriptors go to the heads
-            through a layer of ``backbone.width_out`` features, without PointNet++.
+        features: what is given of each point beside where it is, see ``features.Features``;
+            descriptors go to the heads through a layer of ``backbone.width_out`` features.
         upright: whether the base's z axis points up in all that it was trained with, so that fitted
             boxes are made to stand as well.
         graspable_from: the probability from which on a point is called graspable.
@@ -130,9 +131,9 @@ class Icaf4(nn.Module):
         told = len(config.categories) if len(config.categories) > 1 else 0
         given = CHANNELS[config.features] + told + (config.scale == "cloud")
         self.backbone: PointNet2 | PointwiseBackbone = (
-            PointNet2(given, config.backbone)
-            if config.features == "color"
-            else PointwiseBackbone(given, channels)
+            PointwiseBackbone(given, channels)
+            if config.features in DESCRIPTOR_CHANNELS
+            else PointNet2(given, config.backbone)
         )
         self.register_buffer("length_units", torch.tensor(config.length_units), persistent=False)
         self.segmentation = SegmentationHead(channels, config.num_parts)
@@ -156,7 +157,7 @@ class Icaf4(nn.Module):
 
         Args:
             points_level: float32 (B, N, 3), metres, level frame, centred on the cloud.
-            colors: float32 (B, N, C) in [0, 1], C = 3, or that of the descriptors.
+            colors: float32 (B, N, C) in [0, 1], C of ``features.CHANNELS``.
             category: int64 (B,), into ``config.categories``.
             grasp_points: the points whose grasps are wanted: int64 (B, S), or how many of the
                 points of highest affordance; all when left out.

@@ -24,6 +24,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import Anchors
 from icaf4_policy.cloud import choose_points, level_points
+from icaf4_policy.features import Features, point_inputs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,7 +34,7 @@ class Targets:
     Attributes:
         category: index of the object's category.
         points_level: float32 (M, 3), metres, centred.
-        colors: uint8 (M, 3), or descriptors (M, C).
+        colors: uint8 (M, C), what the network is given of each point, see ``features``.
         part: uint8 (M,).
         npcs: float16 (M, 3) and naocs: float16 (M, 3).
         affordance: uint8 (M,), codes of ``Sample.affordance``.
@@ -113,7 +114,11 @@ def grasp_matches(
 
 
 def targets_from_sample(
-    sample: Sample, categories: Sequence[str], anchors: Anchors, max_points: int
+    sample: Sample,
+    categories: Sequence[str],
+    anchors: Anchors,
+    max_points: int,
+    features: Features = "color",
 ) -> Targets:
     """Works out the targets of a sample.
 
@@ -122,9 +127,10 @@ def targets_from_sample(
         categories: those that the network is for.
         anchors: what successful grasps are matched with.
         max_points: of a longer cloud, this many points are kept, evenly in their order.
+        features: what the network is given of each point.
 
     Raises:
-        InvalidArgumentError: the sample is of another category.
+        InvalidArgumentError: the sample is of another category, or described otherwise.
     """
     category = sample.object_id.partition("/")[0]
     if category not in categories:
@@ -142,7 +148,7 @@ def targets_from_sample(
     return Targets(
         category=list(categories).index(category),
         points_level=points_level[keep].astype(np.float32),
-        colors=sample.colors[keep],
+        colors=point_inputs(points_level, sample.colors, center_level, features, keep),
         part=sample.part[keep],
         npcs=sample.npcs[keep].astype(np.float16),
         naocs=sample.naocs[keep].astype(np.float16),
@@ -183,8 +189,8 @@ class Batch(GraspTargets):
     """B clouds of N points with the targets of P of them; S of these carry grasp targets.
 
     Attributes:
-        points_level: float32 (B, N, 3), metres, and colors: float32 (B, N, 3) in [0, 1], or
-            descriptors (B, N, C).
+        points_level: float32 (B, N, 3), metres, and colors: float32 (B, N, C) in [0, 1], what
+            is given of each point beside it.
         category: int64 (B,).
         part: int64 (B, P), of the first P points, as all that follows.
         npcs: float32 (B, P, 3) and naocs: float32 (B, P, 3).
@@ -225,7 +231,8 @@ class DrawConfig:
         num_grasp_points: S.
         negative_share: share of S given to points where every try failed.
         negative_weight: their weight in the anchor loss.
-        color_jitter: spread of random gain, offset and tint of the colours; 0 leaves them.
+        color_jitter: spread of random gain, offset and tint of the colours, the first three
+            channels of what is given; 0 leaves them.
     """
 
     num_points: int
@@ -259,7 +266,7 @@ def draw_item(targets: Targets, config: DrawConfig, rng: np.random.Generator) ->
     points = targets.points_level[pick]
     colors = targets.colors[pick].astype(np.float32) / 255.0
     if config.color_jitter > 0:
-        colors = _jittered(colors, config.color_jitter, rng)
+        colors[:, :3] = _jittered(colors[:, :3], config.color_jitter, rng)
 
     learnt = pick[: config.learn_points]
     part = targets.part[learnt]

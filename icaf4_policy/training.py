@@ -18,9 +18,9 @@ from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, Sample
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.authors_targets import targets_from_authors
-from icaf4_policy.backbone.classical import CHANNELS, Features
 from icaf4_policy.dataset import SPARE_POINTS
-from icaf4_policy.losses import LossWeights, loss_terms, total_loss
+from icaf4_policy.features import CHANNELS, Features, given_channels, has_color
+from icaf4_policy.losses import LossWeights, SegmentationLoss, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig, Scale
 from icaf4_policy.targets import (
     Batch,
@@ -61,11 +61,12 @@ class TrainingConfig:
         num_grasp_points: points of a cloud whose grasps are learnt in a step.
         anchors: what grasps are refined from.
         scale: what one network unit is, see ``ModelConfig``.
-        features: what is given of each point beside where it is: its colour, or a descriptor of
-            the paper's baselines, which takes the place of PointNet++.
+        features: what is given of each point beside where it is, see ``features.Features``.
         precision: of the products while training; "bfloat16" is a quarter faster where the
             processor has it, and predictions and coordinates stay in float32 all the same.
-        color_jitter: spread of the random change of colours; descriptors are left as they are.
+        color_jitter: spread of the random change of colours.
+        segmentation_loss: of the parts: "cross_entropy" as in the paper, or one minus the
+            "soft_iou" of each cloud's parts, as in its released code.
         validate_every: epochs between validations; the last epoch is always validated.
         seed: of the weights, the order of samples and the choice of points.
         losses: weight of each loss.
@@ -89,6 +90,7 @@ class TrainingConfig:
     scale: Scale = "cloud"
     precision: Literal["float32", "bfloat16"] = "bfloat16"
     color_jitter: float = 0.2
+    segmentation_loss: SegmentationLoss = "cross_entropy"
     validate_every: int = 2
     seed: int = 0
     losses: LossWeights = field(default_factory=LossWeights)
@@ -145,16 +147,18 @@ def prepare(
     for sample in tqdm(samples, desc=label, unit="sample", leave=False, disable=None):
         if isinstance(sample, AuthorsSample):
             name, grasps = str(sample.urdf_id), sample.R_camera_grasps
-            prepared.append(targets_from_authors(sample, anchors, most))
+            prepared.append(targets_from_authors(sample, anchors, most, config.features))
         else:
             name, grasps = sample.object_id, sample.grasp_bits
-            prepared.append(targets_from_sample(sample, config.category, anchors, most))
-        channels = prepared[-1].colors.shape[1]
-        if channels != CHANNELS[config.features]:
-            raise InvalidArgumentError(
-                f"{name}: its points have {channels} channels, expected the "
-                f"{CHANNELS[config.features]} of features={config.features!r}. Describe samples "
-                "with icaf4_policy.backbone.classical.described."
+            channels = sample.colors.shape[1]
+            if channels != given_channels(config.features):
+                raise InvalidArgumentError(
+                    f"{name}: its points have {channels} channels, expected the "
+                    f"{given_channels(config.features)} that features={config.features!r} are made "
+                    "of. Describe samples with icaf4_policy.features.described."
+                )
+            prepared.append(
+                targets_from_sample(sample, config.category, anchors, most, config.features)
             )
         digest.update(name.encode())
         digest.update(np.ascontiguousarray(sample.points_camera).tobytes())
@@ -222,7 +226,7 @@ def _validate(
     for drawn in _batches(targets, draw, config.batch_size, seed=config.seed, epoch=None):
         batch = drawn.to(device)
         outputs = model(batch.points_level, batch.colors, batch.category, batch.grasp_points)
-        terms = loss_terms(outputs, batch)
+        terms = loss_terms(outputs, batch, config.segmentation_loss)
         terms["total"] = total_loss(terms, config.losses)
         for name, term in terms.items():
             sums[name] = sums.get(name, 0.0) + float(term) * len(batch.part)
@@ -316,7 +320,7 @@ def train(
     settings = [asdict(config), training_digest, validation_digest]
     run = TrainingRun(model, optimizer, settings, lambda validation: validation["total"])
     draw_plain = _plain_draw(model, config)
-    jitter = config.color_jitter if config.features == "color" else 0.0
+    jitter = config.color_jitter if has_color(config.features) else 0.0
     draw = replace(draw_plain, color_jitter=jitter, learn_points=config.learn_points)
     run.complete(
         weights,
@@ -361,7 +365,7 @@ def _train_epoch(
                 batch.grasp_points,
                 asked=batch.part.shape[1],
             )
-        terms = loss_terms(outputs, batch)
+        terms = loss_terms(outputs, batch, config.segmentation_loss)
         loss = total_loss(terms, config.losses)
         step = run.epoch * steps_an_epoch + number
         rate = _learning_rate(config, step, steps_an_epoch)

@@ -7,24 +7,21 @@ space (FPFH) or in the picture (DAISY), and the heads are those of the network.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from artgym.datasets.sample import Picture, Sample
 from artgym.errors import InvalidArgumentError, MissingDependencyError
 from artgym.geometry.camera import project
+from icaf4_policy.cloud import Surroundings, plane_normals
 
 Array = NDArray[np.floating]
 
-#: What the network is given of each point.
-Features = Literal["color", "fpfh", "daisy"]
+Descriptor = Literal["fpfh", "daisy"]
 
 # Open3D has FPFH too, equal to a step of 255 in 999 of 1,000 entries; but it brings a web server, a
 # plug-in that pytest cannot load where warnings are errors, and a shared library of the system.
@@ -46,9 +43,8 @@ _DAISY_REACH = 3
 #: An object of more pixels than these in width or height is shrunk to no more.
 _DAISY_PIXELS = 320
 
-#: Channels of each kind of features.
-CHANNELS: dict[Features, int] = {
-    "color": 3,
+#: Numbers in each descriptor.
+DESCRIPTOR_CHANNELS: dict[Descriptor, int] = {
     "fpfh": 3 * _BINS,
     "daisy": (_DAISY_RINGS * _DAISY_HISTOGRAMS + 1) * _DAISY_ORIENTATIONS,
 }
@@ -76,54 +72,6 @@ class PointwiseBackbone(nn.Module):
         features = features[:, :asked]
         hidden: Tensor = F.relu(self.norm(self.linear(features.flatten(0, 1))))  # (B N, o)
         return hidden.unflatten(0, features.shape[:2])
-
-
-def described(picture: Picture, sample: Sample, features: Features) -> Sample:
-    """A sample whose ``colors`` (M, C) are its points' features; the same one for "color".
-
-    Args:
-        picture: the one that the sample is of.
-        sample: one object in it.
-        features: which.
-
-    Raises:
-        MissingDependencyError: a package is missing.
-    """
-    if features == "color":
-        return sample
-    found = point_features(
-        sample.points_camera, sample.colors, picture.rgb, picture.intrinsics, features
-    )
-    return replace(sample, colors=found)
-
-
-def point_features(
-    points_camera: ArrayLike,
-    colors: ArrayLike,
-    rgb: ArrayLike,
-    intrinsics: ArrayLike,
-    features: Features,
-) -> NDArray[np.uint8]:
-    """What a network with these features is given of each point of one object.
-
-    Args:
-        points_camera: (M, 3), metres.
-        colors: uint8 (M, 3).
-        rgb: uint8 (H, W, 3), the picture that the points are seen in.
-        intrinsics: (3, 3), its camera's.
-        features: which.
-
-    Returns:
-        uint8 (M, C), C of ``CHANNELS``.
-
-    Raises:
-        MissingDependencyError: a package is missing.
-    """
-    if features == "fpfh":
-        return fpfh(points_camera)
-    if features == "daisy":
-        return daisy(points_camera, rgb, intrinsics)
-    return np.asarray(colors, dtype=np.uint8)
 
 
 def _bytes(shares: ArrayLike) -> NDArray[np.uint8]:
@@ -156,23 +104,13 @@ def fpfh(points: ArrayLike, viewpoint: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[n
         raise InvalidArgumentError(
             f"points has shape {points.shape}: expected (M, 3) with M at least 1."
         )
-    total = len(points)
-    keep = np.linspace(0, total - 1, min(total, _FEATURE_POINTS)).round().astype(int)
-    support = points[keep]  # (n, 3)
-    # Half of the size, which a few stray points cannot move.
-    reach = np.quantile(np.linalg.norm(support - support.mean(axis=0), axis=1), 0.99)
-    size = max(2.0 * float(reach), 1e-12)
-    # The first of the nearest is the point itself. (n, k), infinite and n where there are fewer.
-    distance, index = cKDTree(support).query(
-        support,
-        k=np.arange(1, _NEIGHBORS + 2),
-        distance_upper_bound=_RADIUS * size,
-    )
-    is_near = np.isfinite(distance)
+    # The first of the nearest is the point itself.
+    near = Surroundings.of(points, _FEATURE_POINTS, _NEIGHBORS + 1, _RADIUS)
+    support, index, distance = near.support, near.index, near.distance
     close = slice(0, _NORMAL_POINTS)
-    normals = _normals(support, index[:, close], is_near[:, close], viewpoint)
+    normals = plane_normals(support, index[:, close], near.found[:, close], viewpoint)
     # A point in the same place twice has no direction to itself.
-    first, slot = np.nonzero(is_near & (distance > 1e-9 * size))  # (n pairs,), ascending
+    first, slot = np.nonzero(near.found & (distance > 1e-9 * near.size))  # (n pairs,), ascending
     second, apart = index[first, slot], distance[first, slot]
     bins = _angle_bins(support[first], support[second], normals[first], normals[second])
     cells = first[:, None] * (3 * _BINS) + np.arange(3) * _BINS + bins  # (n pairs, 3)
@@ -182,23 +120,9 @@ def fpfh(points: ArrayLike, viewpoint: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[n
     weights = csr_matrix((apart**-2, (first, second)), shape=(len(support), len(support)))
     spread = np.maximum(np.asarray(weights.sum(axis=1)), np.finfo(float).tiny)  # (n, 1)
     histograms = 0.5 * (own + (weights @ own) / spread)
-    if total > len(support):
-        histograms = histograms[cKDTree(support).query(points)[1]]
+    if len(points) > len(support):
+        histograms = histograms[near.nearest(points)]
     return _bytes(histograms)
-
-
-def _normals(
-    points: Array, index: NDArray[np.integer], is_near: NDArray[np.bool_], viewpoint: ArrayLike
-) -> Array:
-    """Unit normals (n, 3) of planes through the near ones of each point's neighbours (n, k)."""
-    around = points[np.where(is_near, index, 0)]  # (n, k, 3)
-    weight = is_near[..., None].astype(float)
-    mean = (weight * around).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True)
-    offset = weight * (around - mean)
-    _, axes = np.linalg.eigh(np.swapaxes(offset, 1, 2) @ offset)
-    normals: Array = axes[..., 0]
-    towards = np.sum(normals * (np.asarray(viewpoint, dtype=float) - points), axis=1)
-    return np.where(towards[:, None] < 0, -normals, normals)
 
 
 def _angle_bins(p: Array, q: Array, n_p: Array, n_q: Array) -> NDArray[np.int64]:

@@ -16,9 +16,10 @@ from artgym.files import Manifest, ShardEntry
 from artgym.geometry.rotations import matrix_from_axis_angle
 from icaf4_policy import cli, commands
 from icaf4_policy.backbone import classical
-from icaf4_policy.backbone.classical import CHANNELS, daisy, described, fpfh
+from icaf4_policy.backbone.classical import daisy, fpfh
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
+from icaf4_policy.features import CHANNELS, described
 from icaf4_policy.inference import Perception
 from icaf4_policy.model import Icaf4, ModelConfig
 from icaf4_policy.training import TrainingConfig, train

@@ -9,6 +9,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
+from icaf4_policy.metrics import class_ious
 from icaf4_policy.model import Outputs
 from icaf4_policy.targets import (
     DrawConfig,
@@ -61,6 +62,22 @@ def test_every_loss_is_zero_at_the_truth(batch):
     for name, term in terms.items():
         assert term.item() == pytest.approx(0.0, abs=1e-6), name
     assert total_loss(terms, LossWeights()).item() == pytest.approx(0.0, abs=1e-5)
+    soft = loss_terms(truthful_outputs(batch), batch, "soft_iou")
+    assert soft["segmentation"].item() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_soft_iou_loss_of_sure_parts_is_one_minus_their_iou(batch):
+    called = batch.part.clone()
+    called[:, ::3] = 1 - called[:, ::3]
+    sure = dataclasses.replace(
+        truthful_outputs(batch), segmentation=SURE * F.one_hot(called, 2).float()
+    )
+    ious = [
+        class_ious(mine.numpy(), truth.numpy(), 2)
+        for mine, truth in zip(called, batch.part, strict=True)
+    ]
+    term = loss_terms(sure, batch, "soft_iou")["segmentation"]
+    assert term.item() == pytest.approx(1.0 - np.mean(ious), abs=1e-5)
 
 
 @pytest.mark.parametrize(
