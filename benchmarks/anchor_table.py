@@ -24,21 +24,21 @@ import numpy as np
 import torch
 from rich.table import Table
 
-from artgym.annotation.annotate import labelled_ids
 from artgym.datasets.generate import GenerationConfig, make_pictures
 from artgym.datasets.picture_files import SampleFolder
 from artgym.datasets.sets import SETS
-from artgym.errors import InvalidArgumentError, UnknownNameError
+from artgym.errors import UnknownNameError
 from artgym.files import MANIFEST_NAME, file_sha256
 from artgym.geometry.rotations import grasp_angle, matrix_from_quaternion
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
-from benchmarks.command import cell, run
+from benchmarks.command import cell, require_positive, run
 from benchmarks.grasp_heads import HeadKind, HeadTrainingConfig, train_heads
 from benchmarks.paper import TABLE_2
 from benchmarks.parallel import results_in_order
 from benchmarks.policies import load_perception
+from benchmarks.views import require_labelled
 from icaf4_policy.anchors import (
     ANCHOR_STEPS_DEG,
     AnchorConfig,
@@ -125,10 +125,7 @@ class AnchorTableConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("samples", "epochs", "objects", "views", "workers"):
-            value = getattr(self, name)
-            if value is not None and value < 1:
-                raise InvalidArgumentError(f"{name}={value}: expected 1 or more.")
+        require_positive(self, "samples", "epochs", "objects", "views", "workers")
         for category in self.category:
             catalog.category(category)
         for row in self.rows:
@@ -267,12 +264,6 @@ def measure(config: AnchorTableConfig) -> dict[str, Any]:
 
 
 def _tasks(config: AnchorTableConfig, category: str) -> list[AnchorViewsTask]:
-    ids = labelled_ids(category, config.split, config.labels)[: config.objects]
-    if not ids:
-        raise InvalidArgumentError(
-            f"no labels for {category}/{config.split}: run `artgym annotate --category "
-            f"{category} --split {config.split}` first."
-        )
     return [
         AnchorViewsTask(
             category=category,
@@ -283,7 +274,7 @@ def _tasks(config: AnchorTableConfig, category: str) -> list[AnchorViewsTask]:
             work=config.work.absolute(),
             rows=tuple(config.kinds),
         )
-        for object_id in ids
+        for object_id in require_labelled(category, config)
     ]
 
 

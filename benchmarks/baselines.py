@@ -16,8 +16,8 @@ import torch
 
 from artgym.datasets.picture_files import PictureFolder, SampleFolder
 from artgym.datasets.sample import Sample
-from artgym.errors import InvalidArgumentError
 from artgym.files import MANIFEST_NAME, file_sha256
+from benchmarks.command import require_positive
 from benchmarks.grasp_heads import HeadKind, HeadTrainingConfig, train_heads
 from benchmarks.policies import load_perception
 from icaf4_policy.anchors import AnchorConfig
@@ -49,9 +49,7 @@ class BaselinesConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("pictures", "epochs"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(self, "pictures", "epochs")
 
 
 def train_baselines(

@@ -12,7 +12,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from artgym.errors import ArtgymError, UnknownNameError
+from artgym.errors import ArtgymError, InvalidArgumentError, UnknownNameError
 
 #: Columns of printed tables where they are not shown on a terminal.
 _WIDTH = 180
@@ -28,6 +28,18 @@ class Options(Protocol):
 
 
 C = TypeVar("C", bound=Options)
+
+
+def require_positive(config: object, *names: str) -> None:
+    """Refuses a config with less than one of something; None stands for all of it.
+
+    Raises:
+        InvalidArgumentError: names the field and its value.
+    """
+    for name in names:
+        value = getattr(config, name)
+        if value is not None and value < 1:
+            raise InvalidArgumentError(f"{name}={value}: expected 1 or more.")
 
 
 def run(

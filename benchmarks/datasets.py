@@ -29,7 +29,7 @@ from artgym.geometry.camera import pixel_rays, project
 from artgym.objects import catalog
 from artgym.sim import rays
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.parallel import results_in_order
 from benchmarks.rates import wilson_interval
 
@@ -62,9 +62,7 @@ class DatasetsConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("pictures", "grasps", "workers"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(self, "pictures", "grasps", "workers")
 
 
 @dataclass(frozen=True, kw_only=True)

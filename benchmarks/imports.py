@@ -26,7 +26,7 @@ from artgym.objects.importing import import_object
 from artgym.sim import soundness
 from artgym.sim.scene import ManipulationScene
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.episodes import EpisodeTask, run_episode
 from benchmarks.parallel import results_in_order
 from benchmarks.rates import wilson_interval
@@ -52,9 +52,7 @@ class ImportsConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("seeds", "workers"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(self, "seeds", "workers")
         if not self.folder.is_dir():
             raise InvalidArgumentError(f"folder={self.folder}: no such folder.")
 

@@ -25,7 +25,6 @@ from artgym.annotation.annotate import positions_at, tried_poses, visible_points
 from artgym.annotation.filter import Verdict, judge
 from artgym.annotation.trial import REFERENCE, TRIAL_ENDS, TrialConfig, try_grasp
 from artgym.datasets.sets import SETS
-from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.grasps import NUM_CANDIDATES
 from artgym.geometry.hand import T_hand_grasp
@@ -33,7 +32,7 @@ from artgym.objects import catalog
 from artgym.objects.urdf_export import write_urdf
 from artgym.sim.setting import MAX_YAW
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.parallel import results_in_order
 from benchmarks.where2act_protocol import ProtocolTask, run_protocol
 
@@ -80,9 +79,9 @@ class LabelSpeedConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("objects", "points", "compared", "rejected", "protocol_trials", "workers"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(
+            self, "objects", "points", "compared", "rejected", "protocol_trials", "workers"
+        )
         for category in self.category:
             catalog.object_ids(category, self.split, self.objects)
 

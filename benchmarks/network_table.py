@@ -23,7 +23,6 @@ import numpy as np
 import torch
 from rich.table import Table
 
-from artgym.annotation.annotate import labelled_ids
 from artgym.datasets.picture_files import SampleFolder
 from artgym.datasets.sample import Sample
 from artgym.datasets.sets import SETS
@@ -31,9 +30,9 @@ from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
-from benchmarks.command import cell, run
+from benchmarks.command import cell, require_positive, run
 from benchmarks.parallel import results_in_order
-from benchmarks.views import ViewsTask, score_views
+from benchmarks.views import score_views, views_tasks
 from icaf4_policy.anchors import AnchorConfig
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.losses import LossWeights
@@ -108,10 +107,7 @@ class NetworkTableConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("samples", "epochs", "objects", "views", "workers"):
-            value = getattr(self, name)
-            if value is not None and value < 1:
-                raise InvalidArgumentError(f"{name}={value}: expected 1 or more.")
+        require_positive(self, "samples", "epochs", "objects", "views", "workers")
         for category in self.category:
             catalog.category(category)
         for row in self.rows:
@@ -213,7 +209,8 @@ def measure(config: NetworkTableConfig) -> dict[str, Any]:
     """
     find_device()
     rows = config.rows or tuple(CHOICES)
-    views = [task for category in config.category for task in _views(config, category, rows)]
+    folders = {row: config.work.absolute() / row for row in rows}
+    views = [task for c in config.category for task in views_tasks(c, config, folders)]
     trainings = {}
     for row in rows:
         groups = [config.category] if row == _FOR_ALL else [(c,) for c in config.category]
@@ -222,7 +219,7 @@ def measure(config: NetworkTableConfig) -> dict[str, Any]:
                 training=config.training(row, categories),
                 data=config.data.absolute(),
                 samples=config.samples,
-                folder=config.work.absolute() / row,
+                folder=folders[row],
             )
     seconds = results_in_order(
         train_network,
@@ -258,26 +255,6 @@ def measure(config: NetworkTableConfig) -> dict[str, Any]:
         "columns": dict(COLUMNS),
         "metrics": metrics,
     }
-
-
-def _views(config: NetworkTableConfig, category: str, rows: Sequence[str]) -> list[ViewsTask]:
-    ids = labelled_ids(category, config.split, config.labels)[: config.objects]
-    if not ids:
-        raise InvalidArgumentError(
-            f"no labels for {category}/{config.split}: run `artgym annotate --category "
-            f"{category} --split {config.split}` first."
-        )
-    return [
-        ViewsTask(
-            category=category,
-            object_id=object_id,
-            views=config.views,
-            seed=config.seed,
-            label_root=config.labels and config.labels.absolute(),
-            methods={row: config.work.absolute() / row for row in rows},
-        )
-        for object_id in ids
-    ]
 
 
 def _printed(row: Mapping[str, float]) -> dict[str, float]:

@@ -13,18 +13,17 @@ from typing import Any
 
 from rich.table import Table
 
-from artgym.annotation.annotate import labelled_ids
 from artgym.datasets.sets import SETS
 from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
 from benchmarks.baselines import BaselinesConfig, train_baselines
-from benchmarks.command import cell, run
+from benchmarks.command import cell, require_positive, run
 from benchmarks.paper import METHOD_LABELS, TABLE_1
 from benchmarks.parallel import results_in_order
 from benchmarks.policies import load_perception
-from benchmarks.views import ViewsTask, score_views
+from benchmarks.views import score_views, views_tasks
 from icaf4_policy.metrics import CHANCE_ROWS, COVERAGE_DEG, PRECISION_DEG, mean_rows
 from icaf4_policy.shipped import trained_categories
 
@@ -109,10 +108,7 @@ class ObjectTableConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("objects", "views", "workers"):
-            value = getattr(self, name)
-            if value is not None and value < 1:
-                raise InvalidArgumentError(f"{name}={value}: expected 1 or more.")
+        require_positive(self, "objects", "views", "workers")
         for category in self.category:
             catalog.category(category)
         if (self.data is None) != (self.work is None):
@@ -150,23 +146,7 @@ def measure(config: ObjectTableConfig) -> dict[str, Any]:
         methods = config.weights_of(category)
         for folder in methods.values():
             load_perception(category, folder)
-        ids = labelled_ids(category, config.split, config.labels)[: config.objects]
-        if not ids:
-            raise InvalidArgumentError(
-                f"no labels for {category}/{config.split}: run `artgym annotate --category "
-                f"{category} --split {config.split}` first."
-            )
-        tasks += [
-            ViewsTask(
-                category=category,
-                object_id=object_id,
-                views=config.views,
-                seed=config.seed,
-                label_root=config.labels and config.labels.absolute(),
-                methods=methods,
-            )
-            for object_id in ids
-        ]
+        tasks += views_tasks(category, config, methods)
     rows = results_in_order(
         score_views, tasks, workers=config.workers, description="perception", unit="object"
     )

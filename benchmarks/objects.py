@@ -17,12 +17,11 @@ import numpy as np
 from rich.table import Table
 
 from artgym.annotation.filter import judge
-from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from artgym.sim import soundness
 from artgym.sim.scene import ManipulationScene
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.parallel import results_in_order
 from benchmarks.solvability import solved
 
@@ -56,9 +55,7 @@ class ObjectsConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("sound", "opened", "workers"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(self, "sound", "opened", "workers")
         for category in self.category:
             catalog.object_ids(category, "test", self.opened)
             catalog.all_ids(category, self.sound)

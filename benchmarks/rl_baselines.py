@@ -24,7 +24,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.files import write_file_whole
 from artgym.objects import catalog
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.rates import wilson_interval
 
 
@@ -66,9 +66,9 @@ class RlConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ["steps", "copies", "repeat", "rollout", "batch", "epochs", "episodes"]:
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(
+            self, "steps", "copies", "repeat", "rollout", "batch", "epochs", "episodes"
+        )
         if not self.seeds:
             raise InvalidArgumentError("seeds: expected one or more.")
 

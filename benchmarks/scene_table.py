@@ -24,12 +24,11 @@ from artgym.annotation.annotate import labelled_ids
 from artgym.datasets.generate import GenerationConfig, make_scenes
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, Picture, Sample
 from artgym.datasets.sets import SETS
-from artgym.errors import InvalidArgumentError
 from artgym.geometry.camera import points_from_depth, project
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.paper import TABLE_3
 from benchmarks.parallel import results_in_order
 
@@ -85,9 +84,7 @@ class SceneTableConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("scenes", "workers"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(self, "scenes", "workers")
 
 
 @dataclass(frozen=True, kw_only=True)

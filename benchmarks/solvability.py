@@ -16,12 +16,11 @@ from typing import Any
 from rich.table import Table
 
 from artgym.envs.arguments import require_known
-from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from artgym.registration import environment_ids
 from artgym.sim.robots import RobotName
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.episodes import episode_tasks, outcomes, run_in_worker
 from benchmarks.parallel import results_in_order
 from benchmarks.rates import aggregate
@@ -57,9 +56,7 @@ class SolvabilityConfig:
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        for name in ("objects", "workers"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(self, "objects", "workers")
         for category in self.category:
             catalog.object_ids(category, "test", self.objects)
         for env_id in self.env_id:

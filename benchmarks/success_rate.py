@@ -18,7 +18,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.objects import catalog
 from artgym.sim.renderer import find_device
 from benchmarks import record
-from benchmarks.command import run
+from benchmarks.command import require_positive, run
 from benchmarks.episodes import EpisodeRecord, EpisodeTask, episode_tasks, outcomes, run_in_worker
 from benchmarks.parallel import results_in_order
 from benchmarks.pictures import PicturesTask, require_film_writer, take_pictures
@@ -63,9 +63,7 @@ class SuccessRateConfig:
                 raise InvalidArgumentError(f"{name}={values}: expected different names.")
         for category in self.category:
             catalog.object_ids(category, self.split, self.objects)
-        for name in ("episodes", "workers"):
-            if getattr(self, name) < 1:
-                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 1 or more.")
+        require_positive(self, "episodes", "workers")
         if self.seed < 0:
             raise InvalidArgumentError(f"seed={self.seed}: expected 0 or more.")
         for policy in self.policy:

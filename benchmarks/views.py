@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from artgym.annotation.annotate import positions_at
+from artgym.annotation.annotate import labelled_ids, positions_at
 from artgym.annotation.trial import try_grasp
 from artgym.datasets.generate import GenerationConfig, make_pictures
 from artgym.datasets.sample import JOINT_NONE, JOINT_PRISMATIC, Picture, Sample
+from artgym.errors import InvalidArgumentError
 from artgym.geometry.transforms import invert, transform_from
 from artgym.objects import catalog
 from benchmarks.constrained_fit import ConstrainedFitConfig, fit_parts
@@ -52,6 +53,76 @@ class ViewsTask:
     seed: int
     label_root: Path | None
     methods: Mapping[str, Path | None]
+
+
+class ViewsOptions(Protocol):
+    """Options of a benchmark that looks at labelled objects."""
+
+    @property
+    def split(self) -> catalog.Split:
+        """Of the objects."""
+        ...
+
+    @property
+    def objects(self) -> int | None:
+        """How many at most; None for all."""
+        ...
+
+    @property
+    def views(self) -> int:
+        """Pictures of each labelled joint state."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """Of the views, the choice of points and the chance rows."""
+        ...
+
+    @property
+    def labels(self) -> Path | None:
+        """Folder of labels; None for the shipped ones."""
+        ...
+
+
+def require_labelled(category: str, config: ViewsOptions) -> Sequence[str]:
+    """Ids of the labelled objects that are to be looked at, at least one.
+
+    Raises:
+        InvalidArgumentError: there is none.
+    """
+    ids = labelled_ids(category, config.split, config.labels)[: config.objects]
+    if not ids:
+        raise InvalidArgumentError(
+            f"no labels for {category}/{config.split}: run `artgym annotate --category "
+            f"{category} --split {config.split}` first."
+        )
+    return ids
+
+
+def views_tasks(
+    category: str, config: ViewsOptions, methods: Mapping[str, Path | None]
+) -> list[ViewsTask]:
+    """A task an object.
+
+    Args:
+        category: of the objects and the networks.
+        config: which objects, and how they are looked at.
+        methods: see ``ViewsTask``.
+
+    Raises:
+        InvalidArgumentError: no such object has labels.
+    """
+    return [
+        ViewsTask(
+            category=category,
+            object_id=object_id,
+            views=config.views,
+            seed=config.seed,
+            label_root=config.labels and config.labels.absolute(),
+            methods=methods,
+        )
+        for object_id in require_labelled(category, config)
+    ]
 
 
 def score_views(task: ViewsTask) -> dict[str, list[dict[str, float]]]:
