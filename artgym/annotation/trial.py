@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.hand import T_hand_grasp
 from artgym.objects.model import ArticulatedObject
@@ -48,7 +49,7 @@ class TrialConfig:
             spring.
         miss: how far from the grasp pose the open hand may come to rest, metres.
         nudge: how far the approach may move a part, as a share of its range.
-        look_time: seconds between two looks at the contacts.
+        look_time: seconds between two looks at the contacts, a whole number of steps.
         early_stop: whether an attempt ends as soon as it cannot succeed any more.
         slip_time: seconds without touching the part after which an early stop calls it lost.
     """
@@ -65,6 +66,15 @@ class TrialConfig:
     look_time: float = 1.0 / 60.0
     early_stop: bool = True
     slip_time: float = 0.1
+
+    def __post_init__(self) -> None:
+        for step in (self.approach_timestep, self.physics.timestep):
+            steps = self.look_time / step if step > 0 else 0.0
+            if steps < 0.5 or abs(steps - round(steps)) > 1e-6 * steps:
+                raise InvalidArgumentError(
+                    f"look_time={self.look_time} with steps of {step} s: expected a whole number "
+                    "of steps, one or more."
+                )
 
 
 #: The judge of the fast settings: fine steps all the way, three times the iterations, contacts

@@ -7,7 +7,8 @@ import pytest
 
 from artgym.annotation.annotate import visible_points
 from artgym.annotation.filter import Verdict, judge
-from artgym.annotation.trial import try_grasp
+from artgym.annotation.trial import REFERENCE, TrialConfig, try_grasp
+from artgym.errors import InvalidArgumentError
 from artgym.geometry import transforms
 from artgym.geometry.grasps import candidate_rotations
 from artgym.geometry.rotations import JAW_SYMMETRY
@@ -115,3 +116,12 @@ def test_visible_points_lie_on_the_part_and_face_a_camera(object_id):
     assert np.all(normals @ [0.8, 0.0, 0.6] > -0.9)
     again, _ = visible_points(obj, q, 1, 80, 4, 0.35, np.random.default_rng(0))
     np.testing.assert_array_equal(points, again)
+
+
+def test_looks_come_after_whole_steps():
+    assert REFERENCE.look_time == pytest.approx(4 * REFERENCE.physics.timestep)
+    for seconds in (0.0, -1.0 / 60.0, 1.0 / 500.0, 1.0 / 70.0):
+        with pytest.raises(InvalidArgumentError, match=f"look_time={seconds}"):
+            TrialConfig(look_time=seconds)
+    with pytest.raises(InvalidArgumentError, match=r"steps of 0\.0 s"):
+        TrialConfig(approach_timestep=0.0)
