@@ -41,7 +41,7 @@ def has_normals(features: Features) -> bool:
 
 def given_channels(features: Features) -> int:
     """Of what samples and ``Perception.predict`` hold as colours: those, or a descriptor."""
-    return DESCRIPTOR_CHANNELS.get(features, 3)  # type: ignore[call-overload,no-any-return]
+    return CHANNELS[features] if features in DESCRIPTOR_CHANNELS else 3
 
 
 def point_inputs(
@@ -73,7 +73,8 @@ def point_inputs(
             f"{'descriptors' if features in DESCRIPTOR_CHANNELS else 'the colours'} of features "
             f"{features!r}."
         )
-    given = [] if features in ("none", "normals") else [colors[at]]
+    is_given = has_color(features) or features in DESCRIPTOR_CHANNELS
+    given = [colors[at]] if is_given else []
     if has_normals(features):
         normals = surface_normals(points_level, at, -center_level)
         given.append(np.rint(127.0 * normals + 128.0).astype(np.uint8))
@@ -81,7 +82,7 @@ def point_inputs(
 
 
 def described(picture: Picture, sample: Sample, features: Features) -> Sample:
-    """A sample whose ``colors`` (M, C) are descriptors; the same one where features are none.
+    """A sample whose ``colors`` (M, C) are descriptors; for other features, the sample itself.
 
     Args:
         picture: the one that the sample is of.
@@ -106,7 +107,7 @@ def point_descriptors(
     intrinsics: ArrayLike,
     features: Features,
 ) -> NDArray[np.uint8]:
-    """The descriptors of each point of one object, or its colours where features are none.
+    """The descriptors of each point of one object; for other features, its colours.
 
     Args:
         points_camera: (M, 3), metres.
