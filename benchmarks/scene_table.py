@@ -3,7 +3,8 @@
 Every column is a mean average precision over recall. A detection belongs to the object of its
 category whose mask it overlaps by half or more, the surest first; its parts, its affordance and its
 grasps are then entries of the columns, and hits where they are right. What belongs to no object is
-an entry that misses. Run ``python -m benchmarks.perception table3 --help``.
+an entry that misses. Entries are ranked by the detection's score times how sure the network itself
+is of what it says. Run ``python -m benchmarks.perception table3 --help``.
 """
 
 from __future__ import annotations
@@ -256,11 +257,11 @@ def _claims(
     """The entries of one detection."""
     category, score = seen.detection.category, seen.detection.score
 
-    def entry(column: str, hit: bool, sureness: float = score) -> Entry:
-        return Entry(column=column, category=category, score=sureness, hit=bool(hit))
+    def entry(column: str, hit: bool, confidence: float) -> Entry:
+        return Entry(column=column, category=category, score=score * confidence, hit=bool(hit))
 
     sample = None if owner is None else picture.samples[owner]
-    yield from (entry(column, hit) for column, hit in _part_claims(picture, owner, seen))
+    yield from (entry(*claim) for claim in _part_claims(picture, owner, seen))
     iou = 0.0
     if sample is not None:
         labels = _label_pixels(picture, sample)
@@ -269,48 +270,56 @@ def _claims(
         called = seen.graspable[labels.row, labels.column]
         union = np.sum(called | labels.graspable)
         iou = float(np.sum(called & labels.graspable) / union)
-    yield entry("affordance@75", iou >= 0.75)
-    yield entry("affordance@95", iou >= 0.95)
+    confidence = seen.prediction.affordance_confidence()
+    yield entry("affordance@75", iou >= 0.75, confidence)
+    yield entry("affordance@95", iou >= 0.95, confidence)
     error = np.inf if sample is None else _grasp_error(seen, sample, picture, perception, rng)
-    yield entry("grasp@5deg", error <= np.radians(5.0))
-    yield entry("grasp@10deg", error <= np.radians(10.0))
+    yield entry("grasp@5deg", error <= np.radians(5.0), confidence)
+    yield entry("grasp@10deg", error <= np.radians(10.0), confidence)
 
 
 def _part_claims(
     picture: Picture, owner: int | None, seen: SeenObject
-) -> Iterator[tuple[str, bool]]:
-    """For each part that a detection claims to see and that counts: column, and whether right."""
+) -> Iterator[tuple[str, bool, float]]:
+    """What a detection claims of each part that it says to see and that counts.
+
+    Yields:
+        The column, whether the claim is right, and how sure the network is of it: for points
+        the expected IoU, for a pose that times the share of the points that agree with it.
+    """
     from icaf4_policy.evaluation import true_object_boxes, true_part_boxes
     from icaf4_policy.metrics import pose_errors
 
     claimed = np.flatnonzero(np.bincount(seen.part_mask.ravel())[1:])
-    if owner is None:
-        for _ in claimed:
-            for column in ("part_segmentation@75", "part_pose@5deg5cm", "object_pose@5deg5cm"):
-                yield column, False
-        return
-    sample = picture.samples[owner]
-    counted, mine = _seen_parts(sample), picture.instance_mask == owner + 1
-    poses = {
-        "part_pose@5deg5cm": (seen.prediction.part_boxes, true_part_boxes(sample)),
-        "object_pose@5deg5cm": (seen.prediction.object_boxes, true_object_boxes(sample)),
+    confidences = seen.prediction.part_confidences()
+    fits = {
+        "part_pose@5deg5cm": seen.prediction.part_boxes,
+        "object_pose@5deg5cm": seen.prediction.object_boxes,
     }
+    num_parts, counted = 0, np.zeros(0, dtype=np.int64)
+    mine, truths = np.zeros_like(seen.part_mask, dtype=bool), {}
+    if owner is not None:
+        sample, mine = picture.samples[owner], picture.instance_mask == owner + 1
+        num_parts, counted = sample.num_parts, _seen_parts(sample)
+        truths = {
+            "part_pose@5deg5cm": true_part_boxes(sample),
+            "object_pose@5deg5cm": true_object_boxes(sample),
+        }
     for k in claimed:
-        if k < sample.num_parts and k not in counted:
+        if k < num_parts and k not in counted:
             continue
-        there = mine & (picture.part_mask == k + 1)
-        said = seen.part_mask == k + 1
+        there, said = mine & (picture.part_mask == k + 1), seen.part_mask == k + 1
         iou = np.sum(there & said) / np.sum(there | said)
-        yield "part_segmentation@75", bool(iou >= 0.75)
-        for column, (fits, T_camera_boxes) in poses.items():
-            fit = fits[k]
+        yield "part_segmentation@75", bool(iou >= 0.75), confidences[k]
+        for column, found in fits.items():
+            fit = found[k]
             if fit is None:
                 continue
             right = False
-            if k < sample.num_parts:
-                rotation, translation = pose_errors(fit.T_camera_box, T_camera_boxes[k])
+            if k < num_parts:
+                rotation, translation = pose_errors(fit.T_camera_box, truths[column][k])
                 right = bool(rotation <= _POSE_RAD and translation <= _POSE_M)
-            yield column, right
+            yield column, right, confidences[k] * fit.inlier_share
 
 
 def _grasp_error(

@@ -238,17 +238,19 @@ def predict(
 
 def _described(prediction: Prediction, grasps: int) -> dict[str, Any]:
     """What is printed of a prediction."""
-    best, parts = prediction.grasps, zip(prediction.part_boxes, prediction.joints, strict=True)
+    best, confidences = prediction.grasps, prediction.part_confidences().tolist()
+    parts = zip(prediction.part_boxes, prediction.joints, confidences, strict=True)
     return {
         "up_camera": prediction.R_level_camera[2].tolist(),
         "parts": [
             {
                 "part": k,
                 "points": int((prediction.part == k).sum()),
+                "confidence": confidence,
                 "box": None if box is None else _json_fields(box),
                 "joint": _json_fields(joint),
             }
-            for k, (box, joint) in enumerate(parts)
+            for k, (box, joint, confidence) in enumerate(parts)
         ],
         "grasps": [
             {

@@ -20,6 +20,7 @@ from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.collisions import CollisionConfig, hand_is_free
 from icaf4_policy.features import point_descriptors, point_inputs
 from icaf4_policy.joint_consistency import ConsistencyConfig, consistent_fits
+from icaf4_policy.metrics import expected_iou
 from icaf4_policy.model import Icaf4, Outputs
 from icaf4_policy.pose_fitting import PoseFit, fit_pose
 from icaf4_policy.tabletop import MIN_OBJECT_POINTS, ObjectView, segment_object
@@ -149,6 +150,15 @@ class Prediction:
     joints: tuple[JointEstimate, ...]
     grasps: Grasps
     R_level_camera: Array
+
+    def part_confidences(self) -> Array:
+        """The expected intersection over union (K,) of each part's points; 0 of one without any."""
+        called = self.part[:, None] == np.arange(self.part_probability.shape[1])
+        return expected_iou(self.part_probability, called)
+
+    def affordance_confidence(self) -> float:
+        """The expected intersection over union of the points that are called graspable."""
+        return float(expected_iou(self.affordance[:, None], self.graspable[:, None])[0])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -75,6 +75,22 @@ def grasp_scores(distances: ArrayLike) -> dict[str, float]:
     return scores
 
 
+def expected_iou(probability: ArrayLike, called: ArrayLike) -> Array:
+    """The intersection over union (K,) that calls would have if the probabilities were right.
+
+    The ratio of the expectations: what is called, weighed by its probability, over that and what
+    was expected and not called. It needs no truth, and tells how sure a claim is.
+
+    Args:
+        probability: (N, K).
+        called: bool (N, K); where nothing is, the ratio is 0.
+    """
+    probability, called = np.asarray(probability, dtype=float), np.asarray(called, dtype=bool)
+    shared = (probability * called).sum(axis=0)
+    either = called.sum(axis=0) + (probability * ~called).sum(axis=0)
+    return shared / np.maximum(either, 1e-12)
+
+
 #: The scores of a call where no try succeeded: no success to be near to.
 MISS: dict[str, float] = {f"precision@{t}": 0.0 for t in PRECISION_DEG}
 

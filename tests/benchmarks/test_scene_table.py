@@ -64,13 +64,16 @@ def truth(picture) -> SeenObject:
     graspable = sample.points_camera[sample.affordance == AFFORDANCE_YES]
     row, column = _pixels(graspable, picture).T
     affordance[row, column] = 1.0
+    is_graspable = sample.affordance == AFFORDANCE_YES
     prediction = Prediction(
-        **dict.fromkeys(
-            ("points_camera", "point_index", "part", "part_probability", "npcs", "naocs"),
-            np.zeros(0),
-        ),
-        affordance=np.zeros(0),
-        graspable=np.zeros(0, dtype=bool),
+        points_camera=sample.points_camera.astype(float),
+        point_index=np.arange(len(sample.part)),
+        part=sample.part.astype(np.int64),
+        part_probability=np.eye(sample.num_parts)[sample.part],
+        npcs=sample.npcs.astype(float),
+        naocs=sample.naocs.astype(float),
+        affordance=is_graspable.astype(float),
+        graspable=is_graspable,
         part_boxes=fits(true_part_boxes(sample)),
         object_boxes=fits(true_object_boxes(sample)),
         joints=(),
@@ -134,6 +137,25 @@ def test_a_detection_elsewhere_belongs_to_no_object_and_lowers_what_is_surer(pic
     mine = dataclasses.replace(seen, detection=dataclasses.replace(seen.detection, score=0.9))
     assert owners(picture, [strange, mine]) == [None, 0]
     assert row(picture, [strange, mine]) == dict.fromkeys(COLUMNS, 0.5)
+
+
+def test_what_the_network_is_unsure_of_ranks_behind_what_is_right(picture):
+    seen = truth(picture)
+    sure = seen.prediction
+    guessed = dataclasses.replace(
+        sure,
+        part_probability=0.6 * sure.part_probability + 0.4 / 2,
+        affordance=0.5 * sure.affordance,
+    )
+    rolled = np.roll(seen.detection.mask, 60, axis=1)
+    strange = dataclasses.replace(
+        seen,
+        detection=dataclasses.replace(seen.detection, mask=rolled),
+        part_mask=np.roll(seen.part_mask, 60, axis=1),
+        prediction=guessed,
+    )
+    mine = dataclasses.replace(seen, detection=dataclasses.replace(seen.detection, score=0.9))
+    assert row(picture, [strange, mine]) == dict.fromkeys(COLUMNS, 1.0)
 
 
 def test_interpolated_precision_of_a_known_case():

@@ -122,6 +122,8 @@ def test_prediction_is_complete_and_repeatable(perception, picture):
     assert ((grasps.scores >= 0) & (grasps.scores <= 1)).all()
     np.testing.assert_allclose(np.linalg.det(grasps.R_camera_grasp), 1.0)
     assert set(grasps.of_part(1).parts) <= {1}
+    assert first.part_confidences().shape == (2,)
+    assert 0 <= first.affordance_confidence() <= 1
 
 
 def test_a_part_that_is_known_to_be_there_is_found(perception, sample):
@@ -281,7 +283,7 @@ def test_predict_command(perception, picture, tmp_path, capsys):
     (seen,) = json.loads(capsys.readouterr().out)["objects"]
     assert seen["category"] == "toy"
     assert len(seen["grasps"]) == 3
-    assert len(seen["parts"]) == 2
+    assert [0 <= part["confidence"] <= 1 for part in seen["parts"]] == [True, True]
     assert read_rgb(tmp_path / "seen.png").shape == (120, 480, 3)
 
 

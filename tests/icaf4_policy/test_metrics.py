@@ -21,6 +21,20 @@ def test_class_ious():
     np.testing.assert_allclose(ious, [1 / 2, 2 / 3, np.nan])
 
 
+def test_the_expected_iou_is_what_calls_get_where_the_probabilities_are_right():
+    rng = np.random.default_rng(0)
+    probability = rng.uniform(size=(400, 2))
+    called = probability > [0.5, 0.8]
+    drawn = rng.uniform(size=(300, 400, 2)) < probability
+    ious = (drawn & called).sum(axis=1) / (drawn | called).sum(axis=1)  # (300, 2)
+    np.testing.assert_allclose(
+        metrics.expected_iou(probability, called), ious.mean(axis=0), atol=0.005
+    )
+    np.testing.assert_array_equal(metrics.expected_iou(called, called), 1.0)
+    np.testing.assert_array_equal(metrics.expected_iou(probability, called & False), 0.0)
+    assert metrics.expected_iou(np.zeros((0, 2)), np.zeros((0, 2), bool)).tolist() == [0.0, 0.0]
+
+
 def test_pose_errors():
     T = transform_from(matrix_from_axis_angle([0, 0, 0.1]), [0.3, 0, 0])
     rotation, translation = metrics.pose_errors(T, np.eye(4))
