@@ -34,7 +34,7 @@ from benchmarks.command import cell, require_positive, run
 from benchmarks.parallel import results_in_order
 from benchmarks.views import score_views, views_tasks
 from icaf4_policy.anchors import AnchorConfig
-from icaf4_policy.checkpoint import load_model
+from icaf4_policy.checkpoint import description_path, load_model
 from icaf4_policy.losses import LossWeights
 from icaf4_policy.metrics import COVERAGE_DEG, mean_rows
 from icaf4_policy.shipped import weights_path
@@ -156,7 +156,7 @@ def train_network(task: TrainingTask) -> float | None:
     torch.set_num_threads(1)
     paths = [weights_path(category, task.folder) for category in task.training.category]
     seconds = None
-    if not all(path.exists() for path in paths):
+    if not all(path.exists() and description_path(path).exists() for path in paths):
         began = time.process_time()
         task.folder.mkdir(parents=True, exist_ok=True)
         # What it prints of each validation stands in the description too.
@@ -168,9 +168,8 @@ def train_network(task: TrainingTask) -> float | None:
                 paths[0],
             )
         for path in paths[1:]:
-            # The description last: weights without one count as missing.
             shutil.copyfile(paths[0], path)
-            shutil.copyfile(paths[0].with_suffix(".json"), path.with_suffix(".json"))
+            shutil.copyfile(description_path(paths[0]), description_path(path))
         seconds = time.process_time() - began
     for path in paths:
         found = load_model(path)[1]["training"]["config"]
