@@ -326,10 +326,13 @@ def generate(
     from artgym.datasets.sets import SETS
 
     chosen = category or SETS[set]
-    for name in chosen:
-        for each in split:
-            # A wrong name shall be called that, and not a lack of labels.
-            _catalogue_ids(name, each, None)
+    asked = [(name, each) for name in chosen for each in split]
+    for name, each in asked:
+        # A wrong name shall be called that, and not a lack of labels.
+        _catalogue_ids(name, each, None)
+    for name, each in asked:
+        # What cannot be made is said before an hour was spent on what can.
+        pictures.pictured_ids(name, each, objects, labels)  # type: ignore[arg-type]
     config = pictures.GenerationConfig(
         views=views,
         camera_size=camera_size,

@@ -25,8 +25,10 @@ from artgym.datasets.sample import Sample
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.geometry.rotations import quaternion_from_matrix
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
+from icaf4_policy.backbone.classical import DESCRIPTOR_CHANNELS
 from icaf4_policy.checkpoint import load_model, save_model
 from icaf4_policy.dataset import SPARE_POINTS
+from icaf4_policy.features import has_color
 from icaf4_policy.heads.grasp import GraspHead
 from icaf4_policy.losses import LossWeights, grasp_terms, total_loss
 from icaf4_policy.model import Icaf4
@@ -152,7 +154,7 @@ def train_heads(
     are kept, others replaced.
 
     Args:
-        model: a trained network of one category that is given colours; not changed.
+        model: a trained network of one category, not one of descriptors; not changed.
         samples: training views, read lazily and in a random order.
         kinds: what each head is, by name.
         folder: where the networks are written, see ``head_path``.
@@ -163,7 +165,7 @@ def train_heads(
         The paths of the networks, in the order of ``kinds``.
 
     Raises:
-        InvalidArgumentError: a network of several categories or one without colours; samples of
+        InvalidArgumentError: a network of several categories or of descriptors; samples of
             another category, or none with a successful grasp; no names; more grasp points than
             points; a loss that is not finite.
     """
@@ -199,10 +201,10 @@ def _only_category(model: Icaf4) -> str:
             f"a network for {', '.join(model.config.categories)}: expected one for a single "
             "category."
         )
-    if model.config.features != "color":
+    if model.config.features in DESCRIPTOR_CHANNELS:
         raise InvalidArgumentError(
-            f"a network that is given features={model.config.features!r}: expected one that is "
-            "given colours."
+            f"a network that is given features={model.config.features!r}: expected one that needs "
+            "no pictures."
         )
     return next(iter(model.config.categories))
 
@@ -328,7 +330,7 @@ def _learn(
         num_points=model.config.num_points,
         num_anchors=starts[-1],
         num_grasp_points=config.num_grasp_points,
-        color_jitter=config.color_jitter,
+        color_jitter=config.color_jitter if has_color(model.config.features) else 0.0,
     )
     targets = _targets(model, samples, heads, starts, config)
     drawn = [_drawn(model, targets, draw, config, number) for number in range(config.draws)]
@@ -375,7 +377,9 @@ def _targets(
             sample = samples[i]
             if not sample.successful_tries().any():
                 continue
-            shared = targets_from_sample(sample, model.config.categories, heads[0].anchors, most)
+            shared = targets_from_sample(
+                sample, model.config.categories, heads[0].anchors, most, model.config.features
+            )
             kept.append(_with_all_matches(shared, sample, heads, starts))
             bar.update()
     if not kept:

@@ -116,7 +116,7 @@ class NetworkTableConfig:
 
     def training(self, row: str, categories: tuple[str, ...]) -> TrainingConfig:
         """How a network of a row is trained."""
-        changes = dict(CHOICES[row])
+        changes = {"features": "color", **CHOICES[row]}
         seed = self.seed + changes.pop("seed", 0)
         return TrainingConfig(
             category=categories,

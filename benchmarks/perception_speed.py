@@ -27,6 +27,7 @@ from benchmarks.env_speed import interleaved, ratio_row
 from benchmarks.plain_pointnet2 import plain_features
 from benchmarks.policies import load_perception
 from icaf4_policy.cloud import choose_points, level_points
+from icaf4_policy.features import point_inputs
 from icaf4_policy.inference import Perception
 from icaf4_policy.shipped import trained_categories
 
@@ -90,17 +91,20 @@ def _network_input(
     """Points (1, N, 3), network units, and their features (1, N, C) as the backbone gets them."""
     seen: dict[str, tuple[torch.Tensor, torch.Tensor]] = {}
 
-    def catch(_: Any, given: tuple[torch.Tensor, torch.Tensor]) -> None:
-        seen["input"] = given
+    def catch(_: Any, inputs: tuple[torch.Tensor, torch.Tensor]) -> None:
+        seen["input"] = inputs
 
-    hook = perception.model.backbone.register_forward_pre_hook(catch)
-    points_level, _ = level_points(sample.points_camera, sample.R_level_camera)
-    pick = choose_points(len(points_level), perception.model.config.num_points, rng)
+    model = perception.model
+    hook = model.backbone.register_forward_pre_hook(catch)
+    points_level, center_level = level_points(sample.points_camera, sample.R_level_camera)
+    pick = choose_points(len(points_level), model.config.num_points, rng)
+    features = model.config.features
+    given = point_inputs(points_level, sample.colors, center_level, features, pick)
     with torch.inference_mode():
-        perception.model(
+        model(
             torch.from_numpy(points_level[pick][None].astype(np.float32)),
-            torch.from_numpy(sample.colors[pick][None].astype(np.float32) / 255.0),
-            torch.tensor([perception.model.config.categories.index(perception.category)]),
+            torch.from_numpy(given[None].astype(np.float32) / 255.0),
+            torch.tensor([model.config.categories.index(perception.category)]),
             1,
         )
     hook.remove()

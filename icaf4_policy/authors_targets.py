@@ -15,7 +15,7 @@ from artgym.datasets.sample import (
 from artgym.errors import DamagedFileError
 from icaf4_policy.anchors import Anchors
 from icaf4_policy.cloud import level_points
-from icaf4_policy.features import Features, point_inputs
+from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs
 from icaf4_policy.pose_fitting import umeyama
 from icaf4_policy.targets import Targets
 
@@ -30,7 +30,7 @@ _GRAY = 128
 
 
 def targets_from_authors(
-    sample: AuthorsSample, anchors: Anchors, max_points: int, features: Features = "color"
+    sample: AuthorsSample, anchors: Anchors, max_points: int, features: Features = DEFAULT_FEATURES
 ) -> Targets:
     """Works out the targets of one of the authors' samples, of the network's first category.
 

@@ -105,7 +105,8 @@ def _config_from_json(fields: dict[str, Any]) -> ModelConfig:
         "categories": tuple(fields["categories"]),
         "length_units": tuple(fields["length_units"]),
     }
-    return ModelConfig(**{**fields, **parts})
+    # Networks from before there was a choice were given colours.
+    return ModelConfig(**{"features": "color", **fields, **parts})
 
 
 def load_model(weights: Path) -> tuple[Icaf4, dict[str, Any]]:

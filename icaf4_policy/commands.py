@@ -123,26 +123,20 @@ def _training_samples(
 def _split(
     data: Path, scenes: Sequence[Path], categories: Sequence[str], split: str, features: Features
 ) -> Iterator[Sample]:
-    for category in categories:
-        yield from _samples(data / category / split, features)
-    for folder in scenes:
-        yield from _samples(folder / split, features, categories)
+    """The samples of a split, described; folders are opened at once, samples read one at a time."""
+    own = _folders([data / category / split for category in categories], features)
+    mixed = _folders([folder / split for folder in scenes], features)
+    wanted = (s for s in mixed if s.object_id.partition("/")[0] in categories)
+    return chain(own, wanted)
 
 
-def _samples(
-    folder: Path, features: Features, categories: Sequence[str] | None = None
-) -> Iterator[Sample]:
-    """The samples of a folder, described; of some categories, or all."""
-
-    def wanted(sample: Sample) -> bool:
-        return categories is None or sample.object_id.partition("/")[0] in categories
-
-    if features not in DESCRIPTOR_CHANNELS:
-        # Pictures take far longer to read than samples.
-        yield from filter(wanted, SampleFolder(folder))
-        return
-    for picture in PictureFolder(folder):
-        yield from (described(picture, s, features) for s in picture.samples if wanted(s))
+def _folders(paths: Sequence[Path], features: Features) -> Iterator[Sample]:
+    """The samples of folders, described."""
+    if features in DESCRIPTOR_CHANNELS:
+        pictures = [PictureFolder(path) for path in paths]
+        return (described(p, s, features) for p in chain(*pictures) for s in p.samples)
+    # Pictures take far longer to read than samples.
+    return chain(*[SampleFolder(path) for path in paths])
 
 
 def train_detector(

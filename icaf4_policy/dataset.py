@@ -9,7 +9,7 @@ from torch.utils.data import Dataset, Sampler
 
 from artgym.datasets.sample import Sample
 from icaf4_policy.anchors import Anchors
-from icaf4_policy.features import Features
+from icaf4_policy.features import DEFAULT_FEATURES, Features
 from icaf4_policy.targets import DrawConfig, Item, Targets, draw_item, targets_from_sample
 
 #: Of a sample's points, at most this many times ``num_points`` are kept to draw from.
@@ -52,7 +52,7 @@ class TrainingItems(Dataset[Item]):
         anchors: Anchors,
         config: DrawConfig,
         *,
-        features: Features = "color",
+        features: Features = DEFAULT_FEATURES,
         seed: int = 0,
     ) -> None:
         self.config = config

@@ -19,6 +19,9 @@ Array = NDArray[np.floating]
 #: paper's baselines, which takes the place of PointNet++.
 Features = Literal["none", "color", "normals", "color_normals", "fpfh", "daisy"]
 
+#: What is given where nothing else is asked for.
+DEFAULT_FEATURES: Features = "normals"
+
 #: Channels of each kind of features.
 CHANNELS: dict[Features, int] = {
     "none": 0,

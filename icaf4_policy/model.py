@@ -13,7 +13,7 @@ from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.backbone.classical import DESCRIPTOR_CHANNELS, PointwiseBackbone
 from icaf4_policy.backbone.pointnet2 import BackboneConfig, PointNet2
-from icaf4_policy.features import CHANNELS, Features
+from icaf4_policy.features import CHANNELS, DEFAULT_FEATURES, Features
 from icaf4_policy.heads.affordance import AffordanceHead
 from icaf4_policy.heads.grasp import GraspHead
 from icaf4_policy.heads.joint import JointHead
@@ -54,7 +54,7 @@ class ModelConfig:
     num_points: int = 2048
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
-    features: Features = "color"
+    features: Features = DEFAULT_FEATURES
     upright: bool = False
     graspable_from: float = 0.5
 

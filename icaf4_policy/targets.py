@@ -24,7 +24,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
 from icaf4_policy.anchors import Anchors
 from icaf4_policy.cloud import choose_points, level_points
-from icaf4_policy.features import Features, point_inputs
+from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,7 +118,7 @@ def targets_from_sample(
     categories: Sequence[str],
     anchors: Anchors,
     max_points: int,
-    features: Features = "color",
+    features: Features = DEFAULT_FEATURES,
 ) -> Targets:
     """Works out the targets of a sample.
 

@@ -19,7 +19,13 @@ from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.authors_targets import targets_from_authors
 from icaf4_policy.dataset import SPARE_POINTS
-from icaf4_policy.features import CHANNELS, Features, given_channels, has_color
+from icaf4_policy.features import (
+    CHANNELS,
+    DEFAULT_FEATURES,
+    Features,
+    given_channels,
+    has_color,
+)
 from icaf4_policy.losses import LossWeights, SegmentationLoss, loss_terms, total_loss
 from icaf4_policy.model import Icaf4, ModelConfig, Scale
 from icaf4_policy.targets import (
@@ -86,7 +92,7 @@ class TrainingConfig:
     learn_points: int = 512
     num_grasp_points: int = 384
     anchors: AnchorConfig = field(default_factory=AnchorConfig)
-    features: Features = "color"
+    features: Features = DEFAULT_FEATURES
     scale: Scale = "cloud"
     precision: Literal["float32", "bfloat16"] = "bfloat16"
     color_jitter: float = 0.2

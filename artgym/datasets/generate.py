@@ -583,7 +583,7 @@ def generate_artimage(
     """
     tasks = [
         ShardTask(name=f"{i.replace('/', '_')}.h5", arguments=(i, config, label_root))
-        for i in _pictured(category, split, objects, label_root)
+        for i in pictured_ids(category, split, objects, label_root)
     ]
     return run_shards(
         tasks,
@@ -619,7 +619,7 @@ def generate_reartmix(
         InvalidArgumentError: no labels there, or the folder was made with another configuration.
         RendererUnavailableError: no device here can render.
     """
-    ids = [i for category in categories for i in _pictured(category, split, objects, label_root)]
+    ids = [i for category in categories for i in pictured_ids(category, split, objects, label_root)]
     tasks = [
         ShardTask(
             name=f"scenes_{first:06d}.h5",
@@ -645,10 +645,20 @@ def generate_reartmix(
     )
 
 
-def _pictured(
+def pictured_ids(
     category: str, split: catalog.Split, objects: int | None, label_root: Path | None
 ) -> Sequence[str]:
-    """Ids of the objects of a split that are pictured, at least one."""
+    """Ids of the objects of a split that are pictured, at least one.
+
+    Args:
+        category: of the objects.
+        split: theirs.
+        objects: how many at least; None for the labelled ones.
+        label_root: folder with {category}/{split}, instead of the shipped labels.
+
+    Raises:
+        InvalidArgumentError: no labels there, or not as many objects.
+    """
     labelled = labelled_ids(category, split, label_root)
     if objects is None:
         if not labelled:

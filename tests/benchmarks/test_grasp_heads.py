@@ -190,5 +190,5 @@ def test_what_cannot_be_trained_is_refused(samples, tmp_path):
     with pytest.raises(InvalidArgumentError, match="single category"):
         train_heads(Icaf4(several), samples, KINDS, tmp_path, CONFIG, samples_sha256="toy")
     described = replace(toy_network().config, features="fpfh")
-    with pytest.raises(InvalidArgumentError, match="given colours"):
+    with pytest.raises(InvalidArgumentError, match="no pictures"):
         train_heads(Icaf4(described), samples, KINDS, tmp_path, CONFIG, samples_sha256="toy")

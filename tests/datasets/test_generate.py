@@ -18,6 +18,7 @@ from artgym.annotation.annotate import (
     visible_points,
 )
 from artgym.annotation.filter import FilterConfig, Verdict, judge
+from artgym.datasets import generate
 from artgym.datasets.depth_noise import sensed_depth
 from artgym.datasets.generate import (
     GenerationConfig,
@@ -341,6 +342,16 @@ def test_command_line(labels, tmp_path, capsys):
     assert cli.main(command) == 0
     assert "2 pictures in" in capsys.readouterr().out
     assert (tmp_path / "laptop" / "val" / "laptop_1000.h5").exists()
+
+
+@pytest.mark.parametrize("set_name", ["artimage", "reartmix"])
+def test_more_objects_than_a_split_has_are_told_before_the_first_picture(
+    set_name, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(generate, "run_shards", lambda *_, **__: pytest.fail("began"))
+    command = ["generate", set_name, "--category", "drawer", "--out", str(tmp_path / "out")]
+    assert cli.main([*command, "--objects", "1000"]) == 1
+    assert "count=1000 objects of drawer/val: expected 1 to 200" in capsys.readouterr().err
 
 
 def test_more_objects_than_are_labelled(labels, tmp_path):

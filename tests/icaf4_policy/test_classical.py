@@ -246,8 +246,8 @@ def test_a_network_of_descriptors_tells_categories_apart_and_sees_no_positions()
     assert not torch.allclose(outputs[0], other)
 
 
-def test_descriptions_from_before_descriptors_are_of_colours(tmp_path):
-    model, weights = small(), tmp_path / "toy.safetensors"
+def test_descriptions_from_before_there_was_a_choice_are_of_colours(tmp_path):
+    model, weights = small(features="color"), tmp_path / "toy.safetensors"
     save_model(weights, model, {})
     description = json.loads(description_path(weights).read_text())
     assert description["model"].pop("features") == "color"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from artgym.datasets.picture_files import write_pictures
+from artgym.datasets.picture_files import SampleFolder, write_pictures
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES
 from artgym.errors import DamagedFileError, InvalidArgumentError, MissingDependencyError
 from artgym.files import Manifest, ShardEntry
@@ -205,6 +205,20 @@ def test_train_command(tmp_path, samples, capsys):
     assert facts["config"]["num_points"] == 512
     assert facts["config"]["anchors"]["kind"] == "so3"
     assert (facts["training_samples"], facts["validation_samples"]) == tuple(map(len, samples))
+
+
+def test_a_missing_folder_is_told_before_samples_are_read(tmp_path, samples, monkeypatch):
+    pictures = [[toy_picture(int(sample.object_id[-4:])) for sample in part] for part in samples]
+    write_splits(tmp_path / "data" / "toy", pictures)
+    monkeypatch.setattr(SampleFolder, "_item", lambda *_: pytest.fail("a sample was read"))
+    with pytest.raises(DamagedFileError, match=r"scenes.train.manifest\.json"):
+        commands.train(
+            CONFIG,
+            data=tmp_path / "data",
+            out=tmp_path / "toy.safetensors",
+            scenes=(tmp_path / "scenes",),
+            device="cpu",
+        )
 
 
 def test_scenes_add_their_objects_of_the_category(tmp_path, samples, capsys):
