@@ -126,14 +126,16 @@ def scene_table_block(result: Mapping[str, Any]) -> str:
         lines.append(_line([category, *cells]))
         paper = result["paper"].get(category)
         if paper:
-            cells = [f"{paper[column]:.2f}" for column in columns]
+            cells = [f"{paper[column]:.2f}" if column in paper else "" for column in columns]
             lines.append(_line([f"{category}, paper", *cells]))
     detector = result["detector"]
     lines += [
         "",
         f"{sum(result['objects'].values())} objects in {result['config']['scenes']} scenes. The "
         f"detector alone: mask mAP50 {detector['mask/map50']:.3f}, mAP75 "
-        f"{detector['mask/map75']:.3f}; box mAP50 {detector['box/map50']:.3f}.",
+        f"{detector['mask/map75']:.3f}; box mAP50 {detector['box/map50']:.3f}. Affordance counts by "
+        "the IoU of the points that can be grasped, and by the mean of theirs and that of the "
+        "others, as the paper's tables of single objects do; of its scenes it does not say.",
     ]
     return "\n".join(lines)
 

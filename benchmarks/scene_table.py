@@ -44,6 +44,8 @@ COLUMNS: Mapping[str, str] = {
     "object_pose@5deg5cm": "object pose, 5 deg 5 cm",
     "affordance@75": "affordance, IoU 75",
     "affordance@95": "affordance, IoU 95",
+    "affordance_miou@75": "affordance, mIoU 75",
+    "affordance_miou@95": "affordance, mIoU 95",
     "grasp@5deg": "grasp, 5 deg",
     "grasp@10deg": "grasp, 10 deg",
 }
@@ -219,6 +221,8 @@ def _complete(picture: Picture, index: int, sample: Sample) -> dict[str, int]:
         "object_pose@5deg5cm": parts,
         "affordance@75": known,
         "affordance@95": known,
+        "affordance_miou@75": known,
+        "affordance_miou@95": known,
         "grasp@5deg": known,
         "grasp@10deg": known,
     }
@@ -255,6 +259,8 @@ def _claims(
     rng: np.random.Generator,
 ) -> Iterator[Entry]:
     """The entries of one detection."""
+    from icaf4_policy.metrics import class_ious
+
     category, score = seen.detection.category, seen.detection.score
 
     def entry(column: str, hit: bool, confidence: float) -> Entry:
@@ -262,17 +268,20 @@ def _claims(
 
     sample = None if owner is None else picture.samples[owner]
     yield from (entry(*claim) for claim in _part_claims(picture, owner, seen))
-    iou = 0.0
+    iou = mean_iou = 0.0
     if sample is not None:
         labels = _label_pixels(picture, sample)
         if not labels.graspable.any():
             return
         called = seen.graspable[labels.row, labels.column]
-        union = np.sum(called | labels.graspable)
-        iou = float(np.sum(called & labels.graspable) / union)
+        # Of the points that cannot be grasped, and of those that can.
+        ious = class_ious(called, labels.graspable, 2)
+        iou, mean_iou = float(ious[1]), float(np.nanmean(ious))
     confidence = seen.prediction.affordance_confidence()
     yield entry("affordance@75", iou >= 0.75, confidence)
     yield entry("affordance@95", iou >= 0.95, confidence)
+    yield entry("affordance_miou@75", mean_iou >= 0.75, confidence)
+    yield entry("affordance_miou@95", mean_iou >= 0.95, confidence)
     error = np.inf if sample is None else _grasp_error(seen, sample, picture, perception, rng)
     yield entry("grasp@5deg", error <= np.radians(5.0), confidence)
     yield entry("grasp@10deg", error <= np.radians(10.0), confidence)

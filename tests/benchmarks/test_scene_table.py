@@ -123,6 +123,8 @@ def test_swapped_parts_and_an_empty_affordance_miss(picture):
     nothing = np.zeros_like(seen.graspable)
     found = row(picture, [dataclasses.replace(seen, part_mask=swapped, graspable=nothing)])
     assert found["part_segmentation@75"] == found["affordance@75"] == found["affordance@95"] == 0.0
+    # Half of the classes is half right at most.
+    assert found["affordance_miou@75"] == 0.0
     assert found["part_pose@5deg5cm"] == 1.0
 
 
