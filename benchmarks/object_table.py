@@ -91,7 +91,8 @@ class ObjectTableConfig:
         work: folder for the baselines' networks; those that are there are not trained again.
         baselines: categories that baselines are trained for; those of the paper's table.
         labels: folder with {category}/{split}, instead of the shipped labels.
-        out: folder for object_table.json.
+        depth_noise: give depth the errors of a real sensor, which no network has learnt from.
+        out: folder for object_table.json, or object_table_noise.json.
     """
 
     category: tuple[str, ...] = field(default_factory=trained_categories)
@@ -105,6 +106,7 @@ class ObjectTableConfig:
     work: Path | None = None
     baselines: tuple[str, ...] = SETS["artimage"]
     labels: Path | None = None
+    depth_noise: bool = False
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
@@ -146,7 +148,7 @@ def measure(config: ObjectTableConfig) -> dict[str, Any]:
         methods = config.weights_of(category)
         for folder in methods.values():
             load_perception(category, folder)
-        tasks += views_tasks(category, config, methods)
+        tasks += views_tasks(category, config, methods, depth_noise=config.depth_noise)
     rows = results_in_order(
         score_views, tasks, workers=config.workers, description="perception", unit="object"
     )
@@ -259,7 +261,8 @@ def tables_from_result(result: Mapping[str, Any]) -> Iterable[Table]:
 def report(config: ObjectTableConfig) -> Iterable[Table]:
     """Measures, writes ``object_table.json`` and gives the tables."""
     result = measure(config)
-    record.write_result(config.out / "object_table.json", result)
+    name = "object_table_noise" if config.depth_noise else "object_table"
+    record.write_result(config.out / f"{name}.json", result)
     return tables_from_result(result)
 
 

@@ -90,7 +90,11 @@ _OBJECT_COLUMNS: tuple[tuple[str, str, str], ...] = (
 
 
 def object_table_block(result: Mapping[str, Any]) -> str:
-    """A Markdown table of ``object_table.json``: a category and method a line, the paper's too."""
+    """A Markdown table of ``object_table.json``: a category and method a line, the paper's too.
+
+    The paper has no noise in its pictures, and no line beside pictures with noise.
+    """
+    noisy = result["config"].get("depth_noise", False)
     heads = [heading for heading, _, _ in _OBJECT_COLUMNS]
     lines = _head(["", *heads])
 
@@ -106,13 +110,18 @@ def object_table_block(result: Mapping[str, Any]) -> str:
             name = category if method == "icaf4" else f"{category}, {METHOD_LABELS[method]}"
             lines.append(line(name, values))
             paper = result["paper"].get(method, {}).get(category)
-            if paper:
+            if paper and not noisy:
                 lines.append(line(f"{name}, paper", paper))
     views = ", ".join(f"{count} {category}" for category, count in result["views"].items())
     lines += [
         "",
-        f"Views: {views}. The paper's figures are of other objects and pictures, and leave the "
-        "grasp error undefined: a place to stand, no contest.",
+        f"Views: {views}. "
+        + (
+            "Depth has the errors of a real sensor."
+            if noisy
+            else "The paper's figures are of other objects and pictures, and leave the grasp error "
+            "undefined: a place to stand, no contest."
+        ),
     ]
     return "\n".join(lines)
 
@@ -133,8 +142,8 @@ def scene_table_block(result: Mapping[str, Any]) -> str:
         "",
         f"{sum(result['objects'].values())} objects in {result['config']['scenes']} scenes. The "
         f"detector alone: mask mAP50 {detector['mask/map50']:.3f}, mAP75 "
-        f"{detector['mask/map75']:.3f}; box mAP50 {detector['box/map50']:.3f}. Affordance counts by "
-        "the IoU of the points that can be grasped, and by the mean of theirs and that of the "
+        f"{detector['mask/map75']:.3f}; box mAP50 {detector['box/map50']:.3f}. Affordance counts "
+        "by the IoU of the points that can be grasped, and by the mean of theirs and that of the "
         "others, as the paper's tables of single objects do; of its scenes it does not say.",
     ]
     return "\n".join(lines)
@@ -457,6 +466,7 @@ def network_table_block(result: Mapping[str, Any]) -> str:
 BLOCKS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "success_rate": success_rate_block,
     "object_table": object_table_block,
+    "object_table_noise": object_table_block,
     "scene_table": scene_table_block,
     "real_frame": real_frame_block,
     "objects": objects_block,
@@ -479,6 +489,7 @@ _COMMANDS = {
     "label_speed": "speed labels",
     "pose_speed": "speed poses",
     "object_table": "perception table1",
+    "object_table_noise": "perception table1 --depth-noise",
     "anchor_table": "perception table2",
     "network_table": "perception networks",
     "scene_table": "perception table3",

@@ -45,6 +45,7 @@ class ViewsTask:
         label_root: folder of labels; None for the shipped ones.
         methods: of ``paper.METHOD_LABELS``, the folder with ``{category}.safetensors`` of each;
             None for the shipped weights.
+        depth_noise: whether depth has the errors of a real sensor.
     """
 
     category: str
@@ -53,6 +54,7 @@ class ViewsTask:
     seed: int
     label_root: Path | None
     methods: Mapping[str, Path | None]
+    depth_noise: bool
 
 
 class ViewsOptions(Protocol):
@@ -100,7 +102,11 @@ def require_labelled(category: str, config: ViewsOptions) -> Sequence[str]:
 
 
 def views_tasks(
-    category: str, config: ViewsOptions, methods: Mapping[str, Path | None]
+    category: str,
+    config: ViewsOptions,
+    methods: Mapping[str, Path | None],
+    *,
+    depth_noise: bool = False,
 ) -> list[ViewsTask]:
     """A task an object.
 
@@ -108,6 +114,7 @@ def views_tasks(
         category: of the objects and the networks.
         config: which objects, and how they are looked at.
         methods: see ``ViewsTask``.
+        depth_noise: see ``ViewsTask``.
 
     Raises:
         InvalidArgumentError: no such object has labels.
@@ -120,6 +127,7 @@ def views_tasks(
             seed=config.seed,
             label_root=config.labels and config.labels.absolute(),
             methods=methods,
+            depth_noise=depth_noise,
         )
         for object_id in require_labelled(category, config)
     ]
@@ -131,7 +139,7 @@ def score_views(task: ViewsTask) -> dict[str, list[dict[str, float]]]:
     The metrics are those of ``evaluate_sample``, lengths in object diameters, and "executed":
     whether the best grasp, tried in physics as the labels were, moves the part that it names.
     """
-    config = GenerationConfig(views=task.views, seed=task.seed)
+    config = GenerationConfig(views=task.views, depth_noise=task.depth_noise, seed=task.seed)
     pictures = make_pictures(task.object_id, config, task.label_root)
     return {
         method: [

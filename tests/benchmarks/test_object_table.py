@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,9 @@ from rich.console import Console
 from artgym.datasets.sets import SETS
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from benchmarks import perception
-from benchmarks.object_table import MEAN, ObjectTableConfig, _means, tables_from_result
+from benchmarks.object_table import MEAN, ObjectTableConfig, _means, report, tables_from_result
 from benchmarks.paper import METHOD_LABELS, TABLE_1
+from benchmarks.report import object_table_block
 from benchmarks.views import _optimized
 from icaf4_policy.evaluation import true_part_boxes
 from icaf4_policy.inference import JointEstimate, Perception
@@ -56,6 +58,23 @@ def test_baselines_need_data_and_a_place():
     config = ObjectTableConfig(data=Path("data"), work=Path("work"))
     assert set(config.weights_of("laptop")) == set(METHOD_LABELS)
     assert set(config.weights_of("box")) == {"icaf4"}
+
+
+def test_noisy_depth_is_another_result(tmp_path):
+    plain = ObjectTableConfig(
+        category=("stapler",), split="val", objects=1, views=1, workers=1, out=tmp_path
+    )
+    results = []
+    for config, name in (
+        (plain, "object_table"),
+        (dataclasses.replace(plain, depth_noise=True), "object_table_noise"),
+    ):
+        assert list(report(config))
+        results.append(json.loads((tmp_path / f"{name}.json").read_text()))
+    first, second = (result["metrics"]["stapler"]["icaf4"] for result in results)
+    assert first["part_translation_m"] != second["part_translation_m"]
+    assert "sensor" not in object_table_block(results[0])
+    assert "sensor" in object_table_block(results[1])
 
 
 def test_an_unknown_table_is_named(capsys):
