@@ -94,7 +94,7 @@ def object_table_block(result: Mapping[str, Any]) -> str:
 
     The paper has no noise in its pictures, and no line beside pictures with noise.
     """
-    noisy = result["config"].get("depth_noise", False)
+    noisy = result["config"]["depth_noise"]
     heads = [heading for heading, _, _ in _OBJECT_COLUMNS]
     lines = _head(["", *heads])
 

@@ -125,18 +125,27 @@ def _split(
 ) -> Iterator[Sample]:
     """The samples of a split, described; folders are opened at once, samples read one at a time."""
     own = _folders([data / category / split for category in categories], features)
-    mixed = _folders([folder / split for folder in scenes], features)
-    wanted = (s for s in mixed if s.object_id.partition("/")[0] in categories)
-    return chain(own, wanted)
+    mixed = _folders([folder / split for folder in scenes], features, categories)
+    return chain(own, mixed)
 
 
-def _folders(paths: Sequence[Path], features: Features) -> Iterator[Sample]:
-    """The samples of folders, described."""
+def _folders(
+    paths: Sequence[Path], features: Features, categories: Sequence[str] | None = None
+) -> Iterator[Sample]:
+    """The samples of folders, described; of some categories, or all."""
+
+    def wanted(sample: Sample) -> bool:
+        return categories is None or sample.object_id.partition("/")[0] in categories
+
     if features in DESCRIPTOR_CHANNELS:
         pictures = [PictureFolder(path) for path in paths]
-        return (described(p, s, features) for p in chain(*pictures) for s in p.samples)
+        return (
+            described(picture, sample, features)
+            for picture in chain(*pictures)
+            for sample in filter(wanted, picture.samples)
+        )
     # Pictures take far longer to read than samples.
-    return chain(*[SampleFolder(path) for path in paths])
+    return filter(wanted, chain(*[SampleFolder(path) for path in paths]))
 
 
 def train_detector(
