@@ -64,8 +64,9 @@ def head_kinds() -> Mapping[str, HeadKind]:
     """The rows, by name.
 
     "direct" regression; "axis_10" to "axis_45", the paper's anchors every so many degrees; beside
-    each as many so3 anchors, named by their number: "so3_1836" to "so3_72"; and of "axis_45"
-    what becomes of it with each thing that the released code does otherwise, and with all.
+    each as many so3 anchors, named by their number: "so3_1836" to "so3_72"; the last of them in
+    the "part_frame"; and of "axis_45" what becomes of it with each thing that the released code
+    does otherwise, and with all.
     """
     axis = {step: AnchorConfig(kind="axis", step_deg=step) for step in ANCHOR_STEPS_DEG}
     counts = [len(axis_anchors(step)) for step in ANCHOR_STEPS_DEG]
@@ -77,6 +78,9 @@ def head_kinds() -> Mapping[str, HeadKind]:
     coarse = axis[ANCHOR_STEPS_DEG[-1]]
     return {
         **{name: HeadKind(anchors=kind) for name, kind in anchors.items()},
+        "part_frame": HeadKind(
+            anchors=AnchorConfig(kind="so3", count=counts[-1], frame="part"),
+        ),
         "sign_blind": HeadKind(anchors=coarse, sign_blind=True),
         "one_pose": HeadKind(anchors=coarse, one_pose=True),
         "softmax": HeadKind(anchors=coarse, one_pose=True, softmax=True),

@@ -294,14 +294,14 @@ class _Head:
         """What the head should say of a sample, as ``targets.grasp_matches`` gives it."""
         if not (self.kind.one_pose or self.kind.sign_blind):
             return grasp_matches(sample, self.anchors)
-        row, R_level_grasp = successful_grasps(sample)
+        row, R_grasps = successful_grasps(sample, self.anchors.frame)
         if self.kind.one_pose:
-            central = np.lexsort((mean_angles(row, R_level_grasp), row))
+            central = np.lexsort((mean_angles(row, R_grasps), row))
             first = central[np.unique(row[central], return_index=True)[1]]
-            row, R_level_grasp = row[first], R_level_grasp[first]
+            row, R_grasps = row[first], R_grasps[first]
         if not self.kind.sign_blind:
-            return row, *self.anchors.match(R_level_grasp)
-        q = quaternion_from_matrix(R_level_grasp)
+            return row, *self.anchors.match(R_grasps)
+        q = quaternion_from_matrix(R_grasps)
         q_anchors = quaternion_from_matrix(self.anchors.rotations)
         distance = np.linalg.norm(q[:, None] - q_anchors, axis=-1)  # (n, L)
         matched = np.argmin(distance, axis=-1)

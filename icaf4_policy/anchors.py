@@ -1,18 +1,15 @@
-"""Anchor grasps and the residuals towards real ones (paper, Section 5.3, Eqs. 2 to 4).
-
-Anchors live in the level frame: z up, x in the viewing direction.
-"""
+"""Anchor grasps and the residuals towards real ones (paper, Section 5.3, Eqs. 2 to 4)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artgym.errors import InvalidArgumentError
+from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry.rotations import (
     JAW_SYMMETRY,
     axis_angle_from_matrix,
@@ -102,6 +99,10 @@ def so3_anchors(count: int) -> Array:
     return anchors
 
 
+#: What ``AnchorConfig.frame`` may be.
+AnchorFrame = Literal["level", "part"]
+
+
 @dataclass(frozen=True, kw_only=True)
 class AnchorConfig:
     """Which anchors, and how a residual is written.
@@ -113,13 +114,19 @@ class AnchorConfig:
             has no anchors but regresses one quaternion a point, as a baseline.
         step_deg: of axis anchors.
         count: of so3 anchors.
+        frame: where anchors, and grasps refined from them, are turned with: the "level" frame has z
+            up and x in the viewing direction; the frame of the canonical box of the "part" that a
+            point is on turns with the part, as its good grasps do, but must be found first.
     """
 
     kind: Literal["axis", "so3", "direct"] = "axis"
     step_deg: int = 45
     count: int = 72
+    frame: AnchorFrame = "level"
 
     def __post_init__(self) -> None:
+        if self.frame not in get_args(AnchorFrame):
+            raise UnknownNameError("frame", self.frame, get_args(AnchorFrame))
         anchors_from_config(self)
 
 
@@ -128,11 +135,13 @@ class Anchors:
     """L anchors; r numbers make a residual.
 
     Attributes:
-        kind: of ``AnchorConfig``.
-        rotations: (L, 3, 3), level frame; the unit rotation alone for "direct".
+        kind: of ``AnchorConfig``, and
+        frame: that all rotations below are in.
+        rotations: (L, 3, 3); the unit rotation alone for "direct".
     """
 
     kind: Literal["axis", "so3", "direct"]
+    frame: AnchorFrame
     rotations: Array
 
     def __len__(self) -> int:
@@ -144,19 +153,19 @@ class Anchors:
         """R."""
         return 3 if self.kind == "so3" else 4
 
-    def match(self, R_level_grasps: ArrayLike) -> tuple[NDArray[np.int64], Array]:
+    def match(self, R_frame_grasps: ArrayLike) -> tuple[NDArray[np.int64], Array]:
         """The anchor nearest to each grasp, and the residual from it (Eqs. 2 and 4).
 
         Distance is the geodesic angle, minimum over the jaw symmetry. The residual starts from
         that of the equal grasps (sign of the quaternion, jaws swapped) nearest to the anchor.
 
         Args:
-            R_level_grasps: (n, 3, 3).
+            R_frame_grasps: (n, 3, 3).
 
         Returns:
             Anchor indices (n,) and residuals (n, r).
         """
-        R = np.asarray(R_level_grasps, dtype=float)
+        R = np.asarray(R_frame_grasps, dtype=float)
         variants = np.stack([R, R @ JAW_SYMMETRY])
         q_grasps = quaternion_from_matrix(variants)  # (2, n, 4)
         q_anchors = quaternion_from_matrix(self.rotations)
@@ -166,13 +175,13 @@ class Anchors:
         dot = dots[:, row, matched]  # (2, n)
         variant = np.argmax(np.abs(dot), axis=0)
         if self.kind == "so3":
-            R_anchor_level = np.swapaxes(self.rotations[matched], -1, -2)
-            return matched, axis_angle_from_matrix(R_anchor_level @ variants[variant, row])
+            R_anchor_frame = np.swapaxes(self.rotations[matched], -1, -2)
+            return matched, axis_angle_from_matrix(R_anchor_frame @ variants[variant, row])
         q = q_grasps[variant, row] * np.where(dot[variant, row] < 0, -1.0, 1.0)[:, None]
         return matched, q - q_anchors[matched]
 
     def grasps(self, index: ArrayLike, residuals: ArrayLike) -> Array:
-        """Grasps (..., 3, 3), level frame: anchors at ``index`` (...) and residuals (..., r)."""
+        """Grasps (..., 3, 3): anchors at ``index`` (...) and residuals (..., r)."""
         anchors, residuals = self.rotations[np.asarray(index)], np.asarray(residuals, dtype=float)
         if self.kind == "so3":
             return anchors @ matrix_from_axis_angle(residuals)
@@ -183,7 +192,7 @@ class Anchors:
 def anchors_from_config(config: AnchorConfig) -> Anchors:
     """The anchors that a config asks for."""
     if config.kind == "direct":
-        return Anchors(kind="direct", rotations=np.eye(3)[None])
+        return Anchors(kind="direct", frame=config.frame, rotations=np.eye(3)[None])
     axis = config.kind == "axis"
     rotations = axis_anchors(config.step_deg) if axis else so3_anchors(config.count)
-    return Anchors(kind=config.kind, rotations=rotations)
+    return Anchors(kind=config.kind, frame=config.frame, rotations=rotations)

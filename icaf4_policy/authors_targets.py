@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from artgym.datasets.authors import AuthorsSample
 from artgym.datasets.sample import (
+    AFFORDANCE_UNKNOWN,
     AFFORDANCE_YES,
     JOINT_NONE,
     JOINT_REVOLUTE,
@@ -27,6 +28,8 @@ _JOINT_RADIUS = 0.2
 _R_LEVEL_CAMERA = level_from_camera([0.0, -1.0, 0.0])
 #: Nor what colour a point has.
 _GRAY = 128
+#: That a pose is fitted to.
+_FEWEST_POINTS = 4
 
 
 def targets_from_authors(
@@ -34,7 +37,8 @@ def targets_from_authors(
 ) -> Targets:
     """Works out the targets of one of the authors' samples, of the network's first category.
 
-    Each graspable point has its one grasp as target. Joints are brought from normalised
+    Each graspable point has its one grasp as target; where anchors turn with the parts, a point on
+    a part that is hardly seen is not known to be graspable. Joints are brought from normalised
     coordinates to metres by the pose that fits the points of the base.
 
     Args:
@@ -49,9 +53,18 @@ def targets_from_authors(
     points_level, center_level = level_points(sample.points_camera, _R_LEVEL_CAMERA)
     total = len(points_level)
     keep = np.linspace(0, total - 1, min(total, max_points)).round().astype(int)
-    graspable = np.flatnonzero(sample.affordance[keep] == AFFORDANCE_YES)
-    R_level_grasps = _R_LEVEL_CAMERA @ sample.R_camera_grasps[keep[graspable]].astype(float)
-    matched, residual = anchors.match(R_level_grasps)
+    affordance = sample.affordance[keep].copy()
+    R_grasps = _R_LEVEL_CAMERA @ sample.R_camera_grasps[keep].astype(float)
+    if anchors.frame == "part":
+        for k in range(sample.num_parts):
+            R_level_part = _part_rotation(sample, points_level, k)
+            on_part = sample.part[keep] == k
+            if R_level_part is None:
+                affordance[on_part & (affordance == AFFORDANCE_YES)] = AFFORDANCE_UNKNOWN
+            else:
+                R_grasps[on_part] = R_level_part.T @ R_grasps[on_part]
+    graspable = np.flatnonzero(affordance == AFFORDANCE_YES)
+    matched, residual = anchors.match(R_grasps[graspable])
     axis_level, pivot_level = _joints(sample, points_level)
     gray = np.full((total, 3), _GRAY, dtype=np.uint8)
     return Targets(
@@ -61,7 +74,7 @@ def targets_from_authors(
         part=sample.part[keep],
         npcs=sample.npcs[keep].astype(np.float16),
         naocs=sample.naocs[keep].astype(np.float16),
-        affordance=sample.affordance[keep],
+        affordance=affordance,
         # Every point is its own labelled point.
         grasp_row=np.arange(len(keep), dtype=np.int32),
         joint_type=(sample.joint_type - JOINT_NONE).astype(np.uint8),
@@ -73,16 +86,24 @@ def targets_from_authors(
     )
 
 
+def _part_rotation(sample: AuthorsSample, points_level: Array, k: int) -> Array | None:
+    """``R_level_part`` (3, 3) that fits the points of a part, where there are enough of them."""
+    on_part = sample.part == k
+    if on_part.sum() < _FEWEST_POINTS:
+        return None
+    return umeyama(sample.npcs[on_part], points_level[on_part], np.ones(int(on_part.sum())))[1]
+
+
 def _joints(
     sample: AuthorsSample, points_level: Array
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Axis (K, 3) and pivot (K, 3), metres, of each part's joint; zeros for the base."""
     axes, pivots = (np.zeros((sample.num_parts, 3), dtype=np.float32) for _ in range(2))
     base = sample.part == 0
-    if base.sum() < 4:
+    if base.sum() < _FEWEST_POINTS:
         raise DamagedFileError(
             f"{sample.image_id}: {int(base.sum())} points are on the base, and its joints cannot "
-            "be placed by fewer than 4. Take it off the list."
+            f"be placed by fewer than {_FEWEST_POINTS}. Take it off the list."
         )
     scale, R_level_naocs, t = umeyama(
         sample.naocs[base], points_level[base], np.ones(int(base.sum()))

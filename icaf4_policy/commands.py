@@ -43,6 +43,7 @@ def train(
     data: Path,
     out: Path,
     scenes: tuple[Path, ...] = (),
+    start: Path | None = None,
     log: Path | None = None,
     device: str = "auto",
     threads: int = 1,
@@ -57,6 +58,8 @@ def train(
         out: weights to write, ending in .safetensors.
         scenes: folders with `train` and `val`, made by `artgym generate reartmix`, whose objects of
             the categories are learnt too: turned anyhow and partly hidden.
+        start: weights to start from instead of random ones, for the same categories and features;
+            grasps of other anchors are learnt afresh.
         log: folder for TensorBoard.
         device: cpu, cuda, cuda:1, ...; auto takes a GPU if there is one. Several GPUs train several
             networks at once, a command each. Only the CPU gives the same bytes again.
@@ -67,7 +70,7 @@ def train(
         device = "cuda" if torch.cuda.is_available() else "cpu"
     device = _usable(device)
     samples = _training_samples(data, scenes, config.category, config.features)
-    run_training(config, *samples, out, log=log, device=device)
+    run_training(config, *samples, out, start=start, log=log, device=device)
     print(f"wrote {out} and {description_path(out)}")
     return 0
 

@@ -162,6 +162,18 @@ class Prediction:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class _Parts:
+    """What is found of the parts, as ``Prediction`` has it."""
+
+    part: NDArray[np.int64]
+    probability: Array
+    npcs: Array
+    naocs: Array
+    joints: tuple[JointEstimate, ...]
+    boxes: tuple[PoseFit | None, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Perception:
     """A trained network, ready to look.
 
@@ -320,13 +332,19 @@ class Perception:
         scores, best = outputs.anchors[0, order].sigmoid().topk(min(top, len(anchors)), dim=-1)
         residuals = outputs.residuals[0, order].take_along_dim(best[..., None], dim=1)
         affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
-        R_level_grasp = anchors.grasps(best.numpy(), residuals.numpy())
+        R_frame_grasps = anchors.grasps(best.numpy(), residuals.numpy())
+        R_level_camera = np.asarray(R_level_camera, dtype=float)
+        parts = (
+            self._find_parts(outputs, points, R_level_camera, None, rng)
+            if anchors.frame == "part"
+            else None
+        )
         return PointGrasps(
             points_camera=points,
             point_index=pick,
             affordance=affordance,
             graspable=affordance >= self.model.config.graspable_from,
-            R_camera_grasp=np.asarray(R_level_camera, dtype=float).T @ R_level_grasp,
+            R_camera_grasp=self._anchor_frames(parts, R_level_camera)[:, None] @ R_frame_grasps,
             scores=scores.numpy().astype(float),
         )
 
@@ -369,16 +387,56 @@ class Perception:
         wanted: int | None,
         rng: np.random.Generator,
     ) -> Prediction:
+        parts = self._find_parts(outputs, points, R_level_camera, wanted, rng)
+        affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
+        if wanted is None:
+            part, worth = parts.part, affordance
+        else:
+            part = np.full_like(parts.part, wanted)
+            worth = affordance * parts.probability[:, wanted]
+        return Prediction(
+            points_camera=points,
+            point_index=pick,
+            part=parts.part,
+            part_probability=parts.probability,
+            npcs=parts.npcs,
+            naocs=parts.naocs,
+            affordance=affordance,
+            graspable=affordance >= self.model.config.graspable_from,
+            part_boxes=parts.boxes,
+            object_boxes=self._boxes(
+                parts.naocs, points, parts.part, parts.joints, R_level_camera, rng
+            ),
+            joints=parts.joints,
+            grasps=self._ranked_grasps(
+                outputs,
+                points,
+                part,
+                worth,
+                self._anchor_frames(parts, R_level_camera, wanted),
+                R_level_camera,
+                table_camera,
+            ),
+            R_level_camera=R_level_camera,
+        )
+
+    def _find_parts(
+        self,
+        outputs: Outputs,
+        points: Array,
+        R_level_camera: Array,
+        wanted: int | None,
+        rng: np.random.Generator,
+    ) -> _Parts:
         num_parts = self.model.config.num_parts
-        part_probability = outputs.segmentation[0].softmax(dim=-1).numpy().astype(float)
-        part = part_probability.argmax(axis=-1)
+        probability = outputs.segmentation[0].softmax(dim=-1).numpy().astype(float)
+        part = probability.argmax(axis=-1)
         if wanted is not None and (part == wanted).sum() < MIN_PART_POINTS:
-            likely = np.argsort(-part_probability[:, wanted], kind="stable")
+            likely = np.argsort(-probability[:, wanted], kind="stable")
             part[likely[:MIN_PART_POINTS]] = wanted
         rows = np.arange(len(points))
         npcs = outputs.npcs[0].numpy()[rows, part].astype(float)
         naocs = outputs.naocs[0].numpy()[rows, part].astype(float)
-        affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
 
         joints = []
         type_log = outputs.joint_type[0].log_softmax(dim=-1).numpy()
@@ -396,33 +454,34 @@ class Perception:
                     axis_camera[on_part],
                     points[on_part] + offset_camera[on_part],
                     points[on_part],
-                    part_probability[on_part, k],
+                    probability[on_part, k],
                     moves=k == wanted,
                 )
             )
-        up_camera = R_level_camera[2] if self.model.config.upright else None
-        return Prediction(
-            points_camera=points,
-            point_index=pick,
+        return _Parts(
             part=part,
-            part_probability=part_probability,
+            probability=probability,
             npcs=npcs,
             naocs=naocs,
-            affordance=affordance,
-            graspable=affordance >= self.model.config.graspable_from,
-            part_boxes=self._boxes(npcs, points, part, joints, up_camera, rng),
-            object_boxes=self._boxes(naocs, points, part, joints, up_camera, rng),
             joints=tuple(joints),
-            grasps=self._ranked_grasps(
-                outputs,
-                points,
-                part if wanted is None else np.full_like(part, wanted),
-                affordance if wanted is None else affordance * part_probability[:, wanted],
-                R_level_camera,
-                table_camera,
-            ),
-            R_level_camera=R_level_camera,
+            boxes=self._boxes(npcs, points, part, joints, R_level_camera, rng),
         )
+
+    def _anchor_frames(
+        self, parts: _Parts | None, R_level_camera: Array, wanted: int | None = None
+    ) -> Array:
+        """``R_camera_frame`` of the anchors, (N, 3, 3), or (1, 3, 3) for all points alike.
+
+        Where anchors turn with the parts, that is the box of the part that is wanted, or of the
+        likeliest part of each point among those that were found.
+        """
+        if parts is None or self.model.config.anchors.frame == "level":
+            return R_level_camera.T[None]
+        found = [k for k, box in enumerate(parts.boxes) if box is not None and wanted in (None, k)]
+        R_camera_boxes = np.stack(
+            [box.T_camera_box[:3, :3] for k in found if (box := parts.boxes[k]) is not None]
+        )
+        return R_camera_boxes[parts.probability[:, found].argmax(axis=-1)]
 
     def _boxes(
         self,
@@ -430,7 +489,7 @@ class Perception:
         points: Array,
         part: NDArray[np.int64],
         joints: Sequence[JointEstimate],
-        up_camera: Array | None,
+        R_level_camera: Array,
         rng: np.random.Generator,
     ) -> tuple[PoseFit | None, ...]:
         """One box a part, ``None`` where it was not found."""
@@ -449,7 +508,7 @@ class Perception:
             [joint.joint_type for joint in joints],
             [joint.axis_camera for joint in joints],
             self.consistency,
-            up_camera=up_camera,
+            up_camera=R_level_camera[2] if self.model.config.upright else None,
         )
 
     def _ranked_grasps(
@@ -458,12 +517,14 @@ class Perception:
         points: Array,
         part: NDArray[np.int64],
         worth: Array,
+        R_camera_frames: Array,
         R_level_camera: Array,
         table_camera: Array | None,
     ) -> Grasps:
         """Scores every (point, anchor) pair and keeps the best that differ and are free.
 
-        ``worth`` (N,) is the probability that a point is one to grasp.
+        ``worth`` (N,) is the probability that a point is one to grasp; ``R_camera_frames`` are of
+        ``_anchor_frames``.
         """
         asked = outputs.grasp_points[0].numpy()  # (S,)
         anchors = anchors_from_config(self.model.config.anchors)
@@ -474,7 +535,8 @@ class Perception:
         keep = keep[np.argsort(-scores.flat[keep], kind="stable")]
         row, anchor = np.unravel_index(keep, scores.shape)
         residuals = outputs.residuals[0].numpy()[row, anchor]
-        R_grasps = R_level_camera.T @ anchors.grasps(anchor, residuals)
+        R_camera_frames = np.broadcast_to(R_camera_frames, (len(points), 3, 3))
+        R_grasps = R_camera_frames[asked[row]] @ anchors.grasps(anchor, residuals)
         collisions = self.proposals.collisions
 
         def fits(candidate: int) -> bool:

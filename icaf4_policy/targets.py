@@ -22,7 +22,7 @@ from artgym.datasets.sample import (
 )
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
-from icaf4_policy.anchors import Anchors
+from icaf4_policy.anchors import AnchorFrame, Anchors
 from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs
 
@@ -66,16 +66,25 @@ class Targets:
     tilt: float = math.inf
 
 
-def successful_grasps(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
+def successful_grasps(
+    sample: Sample, frame: AnchorFrame
+) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
     """All grasps of a sample that succeeded.
 
     Returns:
-        The labelled point of each (n,), ascending, and ``R_level_grasp`` (n, 3, 3).
+        The labelled point of each (n,), ascending, and ``R_frame_grasp`` (n, 3, 3).
     """
     row, attempt = np.nonzero(sample.successful_tries())
-    R_level_object = sample.R_level_camera.astype(float) @ sample.T_camera_object[:3, :3]
+    R_camera_object = sample.T_camera_object[:3, :3].astype(float)
+    if frame == "level":
+        R_frame_object = sample.R_level_camera.astype(float) @ R_camera_object
+    else:
+        R_camera_boxes = sample.T_camera_parts[:, :3, :3].astype(float) @ sample.R_object_canonical
+        R_frame_object = (
+            np.swapaxes(R_camera_boxes, -1, -2)[sample.grasp_part[row]] @ R_camera_object
+        )
     points, which = np.unique(row, return_inverse=True)
-    return row, R_level_object @ sample.tried_rotations(points)[which, attempt]
+    return row, R_frame_object @ sample.tried_rotations(points)[which, attempt]
 
 
 def mean_angles(row: NDArray[np.int64], R_grasps: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -100,10 +109,10 @@ def grasp_matches(
     Returns:
         The labelled point of each match (n,), ascending; its anchor (n,); its residual (n, r).
     """
-    row, R_level_grasp = successful_grasps(sample)
-    matched, residual = anchors.match(R_level_grasp)
+    row, R_grasps = successful_grasps(sample, anchors.frame)
+    matched, residual = anchors.match(R_grasps)
     if anchors.kind == "direct":
-        rank = mean_angles(row, R_level_grasp)
+        rank = mean_angles(row, R_grasps)
     else:
         rank = np.sum(residual**2, axis=-1)
     order = np.lexsort((rank, matched, row))

@@ -18,6 +18,7 @@ from artgym.datasets.sample import AFFORDANCE_UNKNOWN, AFFORDANCE_YES, Sample
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.authors_targets import targets_from_authors
+from icaf4_policy.checkpoint import load_model
 from icaf4_policy.dataset import SPARE_POINTS
 from icaf4_policy.features import (
     CHANNELS,
@@ -283,6 +284,7 @@ def train(
     validation_samples: Iterable[Sample | AuthorsSample],
     weights: Path,
     *,
+    start: Path | None = None,
     stop_after_epoch: int | None = None,
     log: Path | None = None,
     device: str = "cpu",
@@ -297,6 +299,9 @@ def train(
         training_samples: views of the training objects.
         validation_samples: views of other objects; they choose the weights and nothing else.
         weights: path of the result, ``.safetensors``; its description lies beside it.
+        start: weights to start from instead of random ones, of a network that takes the same and
+            tells the same parts apart; its length units are kept, and heads of other anchors start
+            afresh.
         stop_after_epoch: leave after this many epochs, as if interrupted there; the next call
             goes on.
         log: folder for TensorBoard.
@@ -319,11 +324,15 @@ def train(
     model_config = _model_config(config, training)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
-        model = Icaf4(model_config).to(device)
+        model = Icaf4(model_config)
+        started_from = None
+        if start is not None:
+            model, started_from = _started(model, start)
+    model = model.to(device)
     optimizer = torch.optim.Adam(
         model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
     )
-    settings = [asdict(config), training_digest, validation_digest]
+    settings = [asdict(config), training_digest, validation_digest, started_from]
     run = TrainingRun(model, optimizer, settings, lambda validation: validation["total"])
     draw_plain = _plain_draw(model, config)
     jitter = config.color_jitter if has_color(config.features) else 0.0
@@ -338,6 +347,7 @@ def train(
         finish=lambda: set_threshold(model, validation, config),
         facts={
             "config": asdict(config),
+            "started_from_sha256": started_from,
             "training_samples": len(training),
             "training_sha256": training_digest,
             "validation_samples": len(validation),
@@ -346,6 +356,30 @@ def train(
         log=log,
     )
     return model.cpu()
+
+
+def _started(model: Icaf4, start: Path) -> tuple[Icaf4, str]:
+    """A network with what fits of the weights ``start``, and their SHA-256.
+
+    Raises:
+        DamagedFileError: the weights are missing or damaged.
+        InvalidArgumentError: they are of a network that is given other things or finds others.
+    """
+    found, description = load_model(start)
+    for name in ("categories", "num_parts", "features", "scale", "backbone"):
+        theirs, ours = getattr(found.config, name), getattr(model.config, name)
+        if theirs != ours:
+            raise InvalidArgumentError(
+                f"start={str(start)!r} has {name}={theirs}, and this training {ours}: start from "
+                "weights of the same, or train with theirs."
+            )
+    same_grasps = found.config.anchors == model.config.anchors
+    kept = {
+        k: t for k, t in found.state_dict().items() if same_grasps or k.split(".")[0] != "grasp"
+    }
+    started = Icaf4(replace(model.config, length_units=found.config.length_units))
+    started.load_state_dict({**model.state_dict(), **kept})
+    return started, str(description["sha256"])
 
 
 def _train_epoch(

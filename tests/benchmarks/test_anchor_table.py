@@ -68,7 +68,7 @@ def test_rows_are_the_papers_and_as_many_on_all_rotations():
     kinds = head_kinds()
     assert list(kinds) == [
         *("direct", "axis_10", "axis_20", "axis_30", "axis_45"),
-        *("so3_1836", "so3_486", "so3_180", "so3_72"),
+        *("so3_1836", "so3_486", "so3_180", "so3_72", "part_frame"),
         *("sign_blind", "one_pose", "softmax", "all_residuals", "released"),
     ]
     assert set(TABLE_2) == set(SETS["artimage"])

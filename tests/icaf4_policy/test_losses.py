@@ -122,7 +122,7 @@ def test_other_parts_channels_and_unmatched_residuals_are_free(batch):
 def test_targets_give_back_successful_grasps(kind):
     sample = toy_sample(0)
     anchors = anchors_from_config(AnchorConfig(kind=kind))
-    row, R_level_grasp = successful_grasps(sample)
+    row, R_grasps = successful_grasps(sample, anchors.frame)
     targets = targets_from_sample(sample, ["toy"], anchors, 512)
     for g in range(len(sample.grasp_part)):
         block = slice(targets.match_start[g], targets.match_start[g + 1])
@@ -132,19 +132,19 @@ def test_targets_give_back_successful_grasps(kind):
             assert len(matched) == 0
             continue
         rebuilt = anchors.grasps(matched, targets.match_residual[block])
-        distances = grasp_angle(rebuilt[:, None], R_level_grasp[row == g][None])
+        distances = grasp_angle(rebuilt[:, None], R_grasps[row == g][None])
         assert distances.min(axis=1).max() < 0.005
-        angles = grasp_angle(R_level_grasp[row == g][:, None], anchors.rotations[None])
+        angles = grasp_angle(R_grasps[row == g][:, None], anchors.rotations[None])
         assert set(angles.argmin(axis=1)) == set(matched)
 
 
 def test_direct_target_is_the_most_central_success():
     sample = toy_sample(0)
     anchors = anchors_from_config(AnchorConfig(kind="direct"))
-    row, R_level_grasp = successful_grasps(sample)
+    row, R_grasps = successful_grasps(sample, anchors.frame)
     targets = targets_from_sample(sample, ["toy"], anchors, 512)
     for g in np.unique(row):
-        here = R_level_grasp[row == g]
+        here = R_grasps[row == g]
         assert targets.match_start[g + 1] - targets.match_start[g] == 1
         kept = anchors.grasps(0, targets.match_residual[targets.match_start[g]])
         means = grasp_angle(here[:, None], here[None]).mean(axis=1)
