@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from artgym.errors import InvalidArgumentError
+from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry.rotations import JAW_SYMMETRY, geodesic_angle, grasp_angle
 from icaf4_policy.anchors import (
     AnchorConfig,
@@ -79,6 +79,11 @@ def test_no_two_so3_anchors_are_one_grasp():
     distances = grasp_angle(so3_anchors(72)[:, None], so3_anchors(72)[None])
     np.fill_diagonal(distances, np.inf)
     assert np.degrees(distances.min()) > 25
+
+
+def test_a_frame_that_does_not_exist_is_named():
+    with pytest.raises(UnknownNameError, match="level"):
+        AnchorConfig(frame="camera")
 
 
 @pytest.mark.parametrize("step_deg", [0, -45, 7, 180])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from artgym.datasets.authors import AuthorsSample
-from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE
+from artgym.datasets.sample import AFFORDANCE_YES, JOINT_NONE, JOINT_REVOLUTE
 from artgym.errors import DamagedFileError
 from artgym.geometry.rotations import grasp_angle, quaternion_from_matrix
 from icaf4_policy import cli
@@ -81,6 +81,26 @@ def test_each_graspable_point_has_its_grasp(sample):
             index, residual = targets.match_anchor[block], targets.match_residual[block]
             R_level_grasp = _R_LEVEL_CAMERA @ authors.R_camera_grasps[point]
             assert grasp_angle(ANCHORS.grasps(index, residual)[0], R_level_grasp) < 0.01
+
+
+def test_grasps_turn_with_parts_that_enough_is_seen_of(sample):
+    authors = as_the_authors(sample)
+    anchors = anchors_from_config(AnchorConfig(frame="part"))
+    targets = targets_from_authors(authors, anchors, len(authors.part))
+    R_lid_camera = sample.T_camera_parts[1, :3, :3].T
+    graspable = np.flatnonzero(targets.affordance)
+    assert len(graspable)
+    for point in graspable:
+        block = slice(*targets.match_start[point : point + 2])
+        index, residual = targets.match_anchor[block], targets.match_residual[block]
+        R_lid_grasp = R_lid_camera @ authors.R_camera_grasps[point]
+        assert grasp_angle(anchors.grasps(index, residual)[0], R_lid_grasp) < 0.01
+    lid = np.flatnonzero(authors.part == 1)
+    few = dataclasses.replace(
+        authors, part=np.where(np.isin(np.arange(len(authors.part)), lid[3:]), 0, authors.part)
+    )
+    hidden = targets_from_authors(few, anchors, len(authors.part))
+    assert (hidden.affordance[few.part == 1] != AFFORDANCE_YES).all()
 
 
 def test_a_hidden_base_is_named(sample):

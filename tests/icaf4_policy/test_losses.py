@@ -1,4 +1,5 @@
 import dataclasses
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from torch.nn import functional as F
 
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
-from icaf4_policy.anchors import AnchorConfig, anchors_from_config
+from icaf4_policy.anchors import AnchorConfig, AnchorFrame, anchors_from_config
 from icaf4_policy.losses import LossWeights, loss_terms, total_loss
 from icaf4_policy.metrics import class_ious
 from icaf4_policy.model import Outputs
@@ -118,10 +119,22 @@ def test_other_parts_channels_and_unmatched_residuals_are_free(batch):
     assert total_loss(loss_terms(free, batch), LossWeights()) < 1e-5
 
 
-@pytest.mark.parametrize("kind", ["axis", "so3"])
-def test_targets_give_back_successful_grasps(kind):
+def test_grasps_in_the_part_frame_are_those_of_the_level_frame():
     sample = toy_sample(0)
-    anchors = anchors_from_config(AnchorConfig(kind=kind))
+    row, R_level_grasps = successful_grasps(sample, "level")
+    again, R_box_grasps = successful_grasps(sample, "part")
+    np.testing.assert_array_equal(row, again)
+    # The lid alone can be grasped, and its box has its axes.
+    R_camera_lid = sample.T_camera_parts[1, :3, :3].astype(float)
+    R_camera_grasps = sample.R_level_camera.T @ R_level_grasps
+    np.testing.assert_allclose(R_camera_lid @ R_box_grasps, R_camera_grasps, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["axis", "so3"])
+@pytest.mark.parametrize("frame", get_args(AnchorFrame))
+def test_targets_give_back_successful_grasps(kind, frame):
+    sample = toy_sample(0)
+    anchors = anchors_from_config(AnchorConfig(kind=kind, frame=frame))
     row, R_grasps = successful_grasps(sample, anchors.frame)
     targets = targets_from_sample(sample, ["toy"], anchors, 512)
     for g in range(len(sample.grasp_part)):
@@ -135,7 +148,10 @@ def test_targets_give_back_successful_grasps(kind):
         distances = grasp_angle(rebuilt[:, None], R_grasps[row == g][None])
         assert distances.min(axis=1).max() < 0.005
         angles = grasp_angle(R_grasps[row == g][:, None], anchors.rotations[None])
-        assert set(angles.argmin(axis=1)) == set(matched)
+        # Several anchors may be equally near.
+        nearest = angles <= angles.min(axis=1, keepdims=True) + 1e-6
+        assert nearest[:, matched].any(axis=0).all()
+        assert nearest[:, matched].any(axis=1).all()
 
 
 def test_direct_target_is_the_most_central_success():

@@ -98,6 +98,26 @@ def test_damaged_resume_file_is_named(tmp_path, samples):
         train(CONFIG, *samples, weights)
 
 
+def test_a_training_starts_from_earlier_weights(tmp_path, samples):
+    first, again, turned = (tmp_path / f"{name}.safetensors" for name in ("a", "b", "c"))
+    train(CONFIG, *samples, first)
+    # So slowly that nothing is learnt: what comes out is what went in, but for the statistics.
+    still = dataclasses.replace(CONFIG, epochs=1, learning_rate=1e-12, weight_decay=0.0)
+    train(still, *samples, again, start=first)
+    part = dataclasses.replace(CONFIG.anchors, frame="part")
+    train(dataclasses.replace(still, anchors=part), *samples, turned, start=first)
+    states = [dict(load_model(path)[0].named_parameters()) for path in (first, again, turned)]
+    for name, tensor in states[0].items():
+        assert torch.allclose(tensor, states[1][name], atol=1e-8)
+        same = torch.allclose(tensor, states[2][name], atol=1e-8)
+        assert same != name.startswith("grasp.")
+    facts = load_model(turned)[1]["training"]
+    assert facts["started_from_sha256"] == load_model(first)[1]["sha256"]
+    other = dataclasses.replace(CONFIG, features="none")
+    with pytest.raises(InvalidArgumentError, match=r"a\.safetensors.*features=normals.*none"):
+        train(other, *samples, tmp_path / "d.safetensors", start=first)
+
+
 def test_both_splits_must_be_there(tmp_path, samples):
     with pytest.raises(InvalidArgumentError, match="0 validation samples"):
         train(CONFIG, samples[0], [], tmp_path / "toy.safetensors")
