@@ -293,14 +293,14 @@ def _part_claims(
     """What a detection claims of each part that it says to see and that counts.
 
     Yields:
-        The column, whether the claim is right, and how sure the network is of it: for points
-        the expected IoU, for a pose that times the share of the points that agree with it.
+        The column, whether the claim is right, and how sure the network is of it.
     """
     from icaf4_policy.evaluation import true_object_boxes, true_part_boxes
     from icaf4_policy.metrics import pose_errors
 
     claimed = np.flatnonzero(np.bincount(seen.part_mask.ravel())[1:])
     confidences = seen.prediction.part_confidences()
+    pose_confidences = seen.prediction.pose_confidences()
     fits = {
         "part_pose@5deg5cm": seen.prediction.part_boxes,
         "object_pose@5deg5cm": seen.prediction.object_boxes,
@@ -328,7 +328,7 @@ def _part_claims(
             if k < num_parts:
                 rotation, translation = pose_errors(fit.T_camera_box, truths[column][k])
                 right = bool(rotation <= _POSE_RAD and translation <= _POSE_M)
-            yield column, right, confidences[k] * fit.inlier_share
+            yield column, right, pose_confidences[k]
 
 
 def _grasp_error(

@@ -244,8 +244,14 @@ def predict(
 
 def _described(prediction: Prediction, grasps: int) -> dict[str, Any]:
     """What is printed of a prediction."""
-    best, confidences = prediction.grasps, prediction.part_confidences().tolist()
-    parts = zip(prediction.part_boxes, prediction.joints, confidences, strict=True)
+    best = prediction.grasps
+    parts = zip(
+        prediction.part_boxes,
+        prediction.joints,
+        prediction.part_confidences().tolist(),
+        prediction.pose_confidences().tolist(),
+        strict=True,
+    )
     return {
         "up_camera": prediction.R_level_camera[2].tolist(),
         "parts": [
@@ -254,9 +260,10 @@ def _described(prediction: Prediction, grasps: int) -> dict[str, Any]:
                 "points": int((prediction.part == k).sum()),
                 "confidence": confidence,
                 "box": None if box is None else _json_fields(box),
+                "box_confidence": box_confidence,
                 "joint": _json_fields(joint),
             }
-            for k, (box, joint, confidence) in enumerate(parts)
+            for k, (box, joint, confidence, box_confidence) in enumerate(parts)
         ],
         "grasps": [
             {

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
 from artgym.errors import InvalidArgumentError, UnknownNameError
-from artgym.geometry.rotations import grasp_angle
+from artgym.geometry.rotations import geodesic_angle, grasp_angle
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points
@@ -29,6 +29,8 @@ Array = NDArray[np.floating]
 
 #: A part is found if this many points are on it.
 MIN_PART_POINTS = 12
+#: Angle between two estimates of the same axes that makes them a third as sure, radians.
+_DOUBT = float(np.radians(5.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +157,22 @@ class Prediction:
         """The expected intersection over union (K,) of each part's points; 0 of one without any."""
         called = self.part[:, None] == np.arange(self.part_probability.shape[1])
         return expected_iou(self.part_probability, called)
+
+    def pose_confidences(self) -> Array:
+        """How sure the boxes (K,) of each part are, in [0, 1]; 0 of a part that was not found.
+
+        Of both boxes of a part, its own and that of the object as it moves with the part, the axes
+        are the same, and their coordinates are predicted apart: it is the expected intersection
+        over union of the part's points, times the share of them that agrees with its box, less the
+        farther the axes of the two are from each other.
+        """
+        confidences = np.zeros(len(self.part_boxes))
+        for k, boxes in enumerate(zip(self.part_boxes, self.object_boxes, strict=True)):
+            own, with_part = boxes
+            if own is not None and with_part is not None:
+                apart = geodesic_angle(own.T_camera_box[:3, :3], with_part.T_camera_box[:3, :3])
+                confidences[k] = own.inlier_share * np.exp(-apart / _DOUBT)
+        return confidences * self.part_confidences()
 
     def affordance_confidence(self) -> float:
         """The expected intersection over union of the points that are called graspable."""

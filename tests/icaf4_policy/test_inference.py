@@ -127,6 +127,25 @@ def test_prediction_is_complete_and_repeatable(perception, picture):
     assert 0 <= first.affordance_confidence() <= 1
 
 
+def test_a_box_is_less_sure_where_two_estimates_of_its_axes_differ(perception, sample):
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    prediction = perception.predict(*seen, rng=rng())
+    found = np.array([box is not None for box in prediction.part_boxes])
+    assert found.any()
+    agreed = dataclasses.replace(prediction, object_boxes=prediction.part_boxes)
+    shares = np.array([box.inlier_share if box else 0.0 for box in prediction.part_boxes])
+    sure = agreed.pose_confidences()
+    np.testing.assert_allclose(sure, agreed.part_confidences() * shares)
+    turn = np.eye(4)
+    turn[:3, :3] = matrix_from_axis_angle([0.0, np.radians(5.0), 0.0])
+    turned = [
+        box and dataclasses.replace(box, T_camera_box=box.T_camera_box @ turn)
+        for box in prediction.part_boxes
+    ]
+    unsure = dataclasses.replace(agreed, object_boxes=tuple(turned)).pose_confidences()
+    np.testing.assert_allclose(unsure[found], sure[found] / np.e)
+
+
 def test_a_part_that_is_known_to_be_there_is_found(perception, sample):
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
     asked = perception.predict(*seen, part=1, rng=rng())
@@ -321,7 +340,8 @@ def test_predict_command(perception, picture, tmp_path, capsys):
     (seen,) = json.loads(capsys.readouterr().out)["objects"]
     assert seen["category"] == "toy"
     assert len(seen["grasps"]) == 3
-    assert [0 <= part["confidence"] <= 1 for part in seen["parts"]] == [True, True]
+    for name in ("confidence", "box_confidence"):
+        assert [0 <= part[name] <= 1 for part in seen["parts"]] == [True, True]
     assert read_rgb(tmp_path / "seen.png").shape == (120, 480, 3)
 
 
