@@ -312,6 +312,9 @@ def train(
         with the best so far, and no result is written.
     """
     keep_freed_memory()
+    earlier = None if start is None else _Earlier(start)
+    if earlier is not None:
+        earlier.require(categories=config.category, features=config.features, scale=config.scale)
     training, training_digest = prepare(training_samples, config, "training samples")
     validation, validation_digest = prepare(validation_samples, config, "validation samples")
     for index, category in enumerate(config.category):
@@ -322,12 +325,16 @@ def train(
                 "must be there. Generate more, with both splits."
             )
     model_config = _model_config(config, training)
+    started_from = None
+    if earlier is not None:
+        earlier.require(num_parts=model_config.num_parts, backbone=model_config.backbone)
+        model_config = replace(model_config, length_units=earlier.model.config.length_units)
+        started_from = earlier.sha256
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         model = Icaf4(model_config)
-        started_from = None
-        if start is not None:
-            model, started_from = _started(model, start)
+    if earlier is not None:
+        earlier.give(model)
     model = model.to(device)
     optimizer = torch.optim.Adam(
         model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
@@ -358,28 +365,37 @@ def train(
     return model.cpu()
 
 
-def _started(model: Icaf4, start: Path) -> tuple[Icaf4, str]:
-    """A network with what fits of the weights ``start``, and their SHA-256.
+class _Earlier:
+    """Weights that a training starts from.
 
     Raises:
-        DamagedFileError: the weights are missing or damaged.
-        InvalidArgumentError: they are of a network that is given other things or finds others.
+        DamagedFileError: they are missing or damaged.
     """
-    found, description = load_model(start)
-    for name in ("categories", "num_parts", "features", "scale", "backbone"):
-        theirs, ours = getattr(found.config, name), getattr(model.config, name)
-        if theirs != ours:
-            raise InvalidArgumentError(
-                f"start={str(start)!r} has {name}={theirs}, and this training {ours}: start from "
-                "weights of the same, or train with theirs."
-            )
-    same_grasps = found.config.anchors == model.config.anchors
-    kept = {
-        k: t for k, t in found.state_dict().items() if same_grasps or k.split(".")[0] != "grasp"
-    }
-    started = Icaf4(replace(model.config, length_units=found.config.length_units))
-    started.load_state_dict({**model.state_dict(), **kept})
-    return started, str(description["sha256"])
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.model, description = load_model(path)
+        self.sha256 = str(description["sha256"])
+
+    def require(self, **settings: object) -> None:
+        """Raises InvalidArgumentError unless the network has just these settings."""
+        for name, ours in settings.items():
+            theirs = getattr(self.model.config, name)
+            if theirs != ours:
+                raise InvalidArgumentError(
+                    f"start={str(self._path)!r} has {name}={theirs}, and this training {ours}: "
+                    "start from weights of the same, or train with theirs."
+                )
+
+    def give(self, model: Icaf4) -> None:
+        """Copies all weights, but those of the grasp head of other anchors."""
+        same_grasps = self.model.config.anchors == model.config.anchors
+        kept = {
+            name: tensor
+            for name, tensor in self.model.state_dict().items()
+            if same_grasps or not name.startswith("grasp.")
+        }
+        model.load_state_dict({**model.state_dict(), **kept})
 
 
 def _train_epoch(

@@ -114,8 +114,12 @@ def test_a_training_starts_from_earlier_weights(tmp_path, samples):
     facts = load_model(turned)[1]["training"]
     assert facts["started_from_sha256"] == load_model(first)[1]["sha256"]
     other = dataclasses.replace(CONFIG, features="none")
+    # Told before the first sample is read.
+    unread = iter(()), iter(())
     with pytest.raises(InvalidArgumentError, match=r"a\.safetensors.*features=normals.*none"):
-        train(other, *samples, tmp_path / "d.safetensors", start=first)
+        train(other, *unread, tmp_path / "d.safetensors", start=first)
+    with pytest.raises(DamagedFileError, match=r"missing\.json"):
+        train(CONFIG, *unread, tmp_path / "d.safetensors", start=tmp_path / "missing.safetensors")
 
 
 def test_both_splits_must_be_there(tmp_path, samples):
