@@ -119,6 +119,11 @@ class ObjectTableConfig:
                 "neither."
             )
 
+    @property
+    def result_name(self) -> str:
+        """What the result is called: pictures with and without noise have one each."""
+        return "object_table_noise" if self.depth_noise else "object_table"
+
     def weights_of(self, category: str) -> dict[str, Path | None]:
         """The folder of each method's weights for a category; None for the shipped ones."""
         folders = {"icaf4": self.weights and self.weights.absolute()}
@@ -259,10 +264,9 @@ def tables_from_result(result: Mapping[str, Any]) -> Iterable[Table]:
 
 
 def report(config: ObjectTableConfig) -> Iterable[Table]:
-    """Measures, writes ``object_table.json`` and gives the tables."""
+    """Measures, writes the result and gives the tables."""
     result = measure(config)
-    name = "object_table_noise" if config.depth_noise else "object_table"
-    record.write_result(config.out / f"{name}.json", result)
+    record.write_result(config.out / f"{config.result_name}.json", result)
     return tables_from_result(result)
 
 
