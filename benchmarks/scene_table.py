@@ -295,8 +295,8 @@ def _part_claims(
     Yields:
         The column, whether the claim is right, and how sure the network is of it.
     """
-    from icaf4_policy.evaluation import true_object_boxes, true_part_boxes
     from icaf4_policy.metrics import pose_errors
+    from icaf4_policy.targets import true_object_boxes, true_part_boxes
 
     claimed = np.flatnonzero(np.bincount(seen.part_mask.ravel())[1:])
     confidences = seen.prediction.part_confidences()

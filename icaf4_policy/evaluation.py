@@ -14,29 +14,12 @@ from artgym.datasets.sample import (
     JOINT_NONE,
     Sample,
 )
-from artgym.geometry.transforms import invert, transform_from, translation
 from icaf4_policy import metrics
 from icaf4_policy.inference import MIN_PART_POINTS, Perception, PointGrasps, Prediction
 from icaf4_policy.pose_fitting import PoseFit
+from icaf4_policy.targets import true_object_boxes, true_part_boxes
 
 Array = NDArray[np.floating]
-
-
-def true_part_boxes(sample: Sample) -> Array:
-    """``T_camera_box`` (K, 4, 4) of the parts' canonical boxes."""
-    return sample.T_camera_parts @ _boxes(sample, sample.part_centers)
-
-
-def true_object_boxes(sample: Sample) -> Array:
-    """``T_camera_box`` (K, 4, 4) of the object's rest-state box as it moves with each part."""
-    T_camera_rests = sample.T_camera_parts @ invert(sample.T_object_rest_parts)
-    return T_camera_rests @ _boxes(sample, sample.object_center)
-
-
-def _boxes(sample: Sample, centers: Array) -> Array:
-    """Poses (..., 4, 4) of canonical boxes at rest by their centers (..., 3), object frame."""
-    turn = transform_from(sample.R_object_canonical.astype(float), np.zeros(3))
-    return turn @ translation(centers.astype(float))
 
 
 def evaluate_sample(

@@ -495,11 +495,13 @@ class Perception:
         """
         if parts is None or self.model.config.anchors.frame == "level":
             return R_level_camera.T[None]
-        found = [k for k, box in enumerate(parts.boxes) if box is not None and wanted in (None, k)]
-        R_camera_boxes = np.stack(
-            [box.T_camera_box[:3, :3] for k in found if (box := parts.boxes[k]) is not None]
-        )
-        return R_camera_boxes[parts.probability[:, found].argmax(axis=-1)]
+        R_camera_boxes = {
+            k: box.T_camera_box[:3, :3]
+            for k, box in enumerate(parts.boxes)
+            if box is not None and wanted in (None, k)
+        }
+        likeliest = parts.probability[:, list(R_camera_boxes)].argmax(axis=-1)
+        return np.stack(list(R_camera_boxes.values()))[likeliest]
 
     def _boxes(
         self,

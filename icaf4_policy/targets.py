@@ -22,6 +22,7 @@ from artgym.datasets.sample import (
 )
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import grasp_angle
+from artgym.geometry.transforms import invert, transform_from, translation
 from icaf4_policy.anchors import AnchorFrame, Anchors
 from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs
@@ -66,6 +67,23 @@ class Targets:
     tilt: float = math.inf
 
 
+def true_part_boxes(sample: Sample) -> NDArray[np.floating]:
+    """``T_camera_box`` (K, 4, 4) of the parts' canonical boxes."""
+    return sample.T_camera_parts @ _boxes(sample, sample.part_centers)
+
+
+def true_object_boxes(sample: Sample) -> NDArray[np.floating]:
+    """``T_camera_box`` (K, 4, 4) of the object's rest-state box as it moves with each part."""
+    T_camera_rests = sample.T_camera_parts @ invert(sample.T_object_rest_parts)
+    return T_camera_rests @ _boxes(sample, sample.object_center)
+
+
+def _boxes(sample: Sample, centers: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Poses (..., 4, 4) of canonical boxes at rest by their centers (..., 3), object frame."""
+    turn = transform_from(sample.R_object_canonical.astype(float), np.zeros(3))
+    return turn @ translation(centers.astype(float))
+
+
 def successful_grasps(
     sample: Sample, frame: AnchorFrame
 ) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
@@ -79,10 +97,8 @@ def successful_grasps(
     if frame == "level":
         R_frame_object = sample.R_level_camera.astype(float) @ R_camera_object
     else:
-        R_camera_boxes = sample.T_camera_parts[:, :3, :3].astype(float) @ sample.R_object_canonical
-        R_frame_object = (
-            np.swapaxes(R_camera_boxes, -1, -2)[sample.grasp_part[row]] @ R_camera_object
-        )
+        R_box_camera = np.swapaxes(true_part_boxes(sample)[:, :3, :3], -1, -2)
+        R_frame_object = R_box_camera[sample.grasp_part[row]] @ R_camera_object
     points, which = np.unique(row, return_inverse=True)
     return row, R_frame_object @ sample.tried_rotations(points)[which, attempt]
 

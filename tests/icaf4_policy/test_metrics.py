@@ -7,7 +7,7 @@ from artgym.geometry.grasps import NUM_CANDIDATES, candidate_rotations
 from artgym.geometry.rotations import JAW_SYMMETRY, grasp_angle, matrix_from_axis_angle
 from artgym.geometry.transforms import apply, invert, transform_from
 from icaf4_policy import metrics
-from icaf4_policy.evaluation import true_object_boxes, true_part_boxes
+from icaf4_policy.targets import true_object_boxes, true_part_boxes
 from tests.icaf4_policy.toy import toy_sample
 
 
