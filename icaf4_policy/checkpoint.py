@@ -96,17 +96,20 @@ def save_model(weights: Path, model: nn.Module, facts: Mapping[str, Any]) -> Non
 
 
 def _config_from_json(fields: dict[str, Any]) -> ModelConfig:
-    backbone: dict[str, Any] = {
-        k: tuple(v) if isinstance(v, list) else v for k, v in fields["backbone"].items()
-    }
+    fields = {name: _as_tuples(value) for name, value in fields.items()}
     parts = {
         "anchors": AnchorConfig(**fields["anchors"]),
-        "backbone": BackboneConfig(**backbone),
-        "categories": tuple(fields["categories"]),
-        "length_units": tuple(fields["length_units"]),
+        "backbone": BackboneConfig(**fields["backbone"]),
     }
     # Networks from before there was a choice were given colours.
     return ModelConfig(**{"features": "color", **fields, **parts})
+
+
+def _as_tuples(value: Any) -> Any:
+    """A JSON value with tuples for its lists."""
+    if isinstance(value, dict):
+        return {name: _as_tuples(each) for name, each in value.items()}
+    return tuple(map(_as_tuples, value)) if isinstance(value, list) else value
 
 
 def load_model(weights: Path) -> tuple[Icaf4, dict[str, Any]]:

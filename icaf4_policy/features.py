@@ -84,6 +84,12 @@ def point_inputs(
     return np.concatenate(given, axis=1) if given else np.empty((len(at), 0), np.uint8)
 
 
+def given_normals(given: NDArray[np.uint8]) -> Array:
+    """The unit normals (n, 3) in what a network is given (n, C), of features that have them."""
+    normals = given[:, -3:].astype(float) - 128.0
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
 def described(picture: Picture, sample: Sample, features: Features) -> Sample:
     """A sample whose ``colors`` (M, C) are descriptors; for other features, the sample itself.
 

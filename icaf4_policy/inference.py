@@ -9,17 +9,22 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
-from torch import Tensor
 
 from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
 from artgym.errors import InvalidArgumentError, UnknownNameError
 from artgym.geometry.rotations import geodesic_angle, grasp_angle
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
-from icaf4_policy.cloud import choose_points, level_points
+from icaf4_policy.cloud import choose_points, level_points, surface_normals
 from icaf4_policy.collisions import CollisionConfig, hand_is_free
-from icaf4_policy.features import point_descriptors, point_inputs
-from icaf4_policy.joint_consistency import ConsistencyConfig, consistent_fits
+from icaf4_policy.faces import face_directions
+from icaf4_policy.features import (
+    given_normals,
+    has_normals,
+    point_descriptors,
+    point_inputs,
+)
+from icaf4_policy.joint_consistency import AxisDirection, ConsistencyConfig, consistent_fits
 from icaf4_policy.metrics import expected_iou
 from icaf4_policy.model import Icaf4, Outputs
 from icaf4_policy.pose_fitting import PoseFit, fit_pose
@@ -180,6 +185,25 @@ class Prediction:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class _Look:
+    """What the network saw and said. N points.
+
+    Attributes:
+        outputs: what it said.
+        points: (N, 3), camera frame, metres.
+        pick: int64 (N,), which of the given points they are.
+        normals: (N, 3), unit, camera frame.
+        R_level_camera: (3, 3).
+    """
+
+    outputs: Outputs
+    points: Array
+    pick: NDArray[np.int64]
+    normals: Array
+    R_level_camera: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Parts:
     """What is found of the parts, as ``Prediction`` has it."""
 
@@ -199,8 +223,8 @@ class Perception:
         model: in evaluation mode.
         category: of the objects to look at, one of those that the network is for.
         proposals: how grasps are ranked.
-        consistency: how the boxes are made to agree with the joints; None leaves each part the
-            fit of its own points.
+        consistency: how the boxes are made to agree with the joints, the vertical and the faces
+            that are seen; None leaves each part the fit of its own points.
     """
 
     model: Icaf4
@@ -234,9 +258,9 @@ class Perception:
         return cls(model=model, category=category or next(iter(known)))
 
     @property
-    def _index(self) -> Tensor:
-        """The category (1,) as the network is told it."""
-        return torch.tensor([self.model.config.categories.index(self.category)])
+    def _index(self) -> int:
+        """The category as the network is told it."""
+        return self.model.config.categories.index(self.category)
 
     def perceive(
         self,
@@ -324,12 +348,9 @@ class Perception:
             raise InvalidArgumentError(
                 f"part={part}: the network knows the movable parts 1 to {num_parts - 1}."
             )
-        outputs, points, pick = self._look(
-            points_camera, colors, R_level_camera, rng, self.proposals.points, part
-        )
-        R_level_camera = np.asarray(R_level_camera, dtype=float)
+        look = self._look(points_camera, colors, R_level_camera, rng, self.proposals.points, part)
         table = None if table_camera is None else np.asarray(table_camera, dtype=float)
-        return self._prediction(outputs, points, pick, R_level_camera, table, part, rng)
+        return self._prediction(look, table, part, rng)
 
     @torch.inference_mode()
     def point_grasps(
@@ -342,27 +363,22 @@ class Perception:
         rng: np.random.Generator,
     ) -> PointGrasps:
         """The ``top`` best anchors, refined, at every point; arguments as of ``predict``."""
-        outputs, points, pick = self._look(
-            points_camera, colors, R_level_camera, rng, self.model.config.num_points
-        )
+        look = self._look(points_camera, colors, R_level_camera, rng, self.model.config.num_points)
+        outputs = look.outputs
         anchors = anchors_from_config(self.model.config.anchors)
         order = outputs.grasp_points[0].argsort()
         scores, best = outputs.anchors[0, order].sigmoid().topk(min(top, len(anchors)), dim=-1)
         residuals = outputs.residuals[0, order].take_along_dim(best[..., None], dim=1)
         affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
         R_frame_grasps = anchors.grasps(best.numpy(), residuals.numpy())
-        R_level_camera = np.asarray(R_level_camera, dtype=float)
-        parts = (
-            self._find_parts(outputs, points, R_level_camera, None, rng)
-            if anchors.frame == "part"
-            else None
-        )
+        parts = self._find_parts(look, None, rng) if anchors.frame == "part" else None
         return PointGrasps(
-            points_camera=points,
-            point_index=pick,
+            points_camera=look.points,
+            point_index=look.pick,
             affordance=affordance,
             graspable=affordance >= self.model.config.graspable_from,
-            R_camera_grasp=self._anchor_frames(parts, R_level_camera)[:, None] @ R_frame_grasps,
+            R_camera_grasp=self._anchor_frames(parts, look.R_level_camera)[:, None]
+            @ R_frame_grasps,
             scores=scores.numpy().astype(float),
         )
 
@@ -374,8 +390,7 @@ class Perception:
         rng: np.random.Generator,
         grasp_points: int,
         part: int | None = None,
-    ) -> tuple[Outputs, Array, NDArray[np.int64]]:
-        """The network's outputs, the points it saw (N, 3), and which of the given they are."""
+    ) -> _Look:
         points_camera, colors = np.asarray(points_camera, dtype=float), np.asarray(colors)
         if points_camera.ndim != 2 or len(points_camera) < MIN_OBJECT_POINTS:
             raise InvalidArgumentError(
@@ -389,23 +404,28 @@ class Perception:
         outputs = self.model(
             torch.from_numpy(points_level[pick][None].astype(np.float32)),
             torch.from_numpy(given[None].astype(np.float32) / 255.0),
-            self._index,
+            torch.tensor([self._index]),
             min(grasp_points, config.num_points),
             part=part,
         )
-        return outputs, points_camera[pick], pick
+        R_level_camera = np.asarray(R_level_camera, dtype=float)
+        return _Look(
+            outputs=outputs,
+            points=points_camera[pick],
+            pick=pick,
+            normals=(
+                given_normals(given) @ R_level_camera
+                if has_normals(config.features)
+                else surface_normals(points_camera, pick, np.zeros(3))
+            ),
+            R_level_camera=R_level_camera,
+        )
 
     def _prediction(
-        self,
-        outputs: Outputs,
-        points: Array,
-        pick: NDArray[np.int64],
-        R_level_camera: Array,
-        table_camera: Array | None,
-        wanted: int | None,
-        rng: np.random.Generator,
+        self, look: _Look, table_camera: Array | None, wanted: int | None, rng: np.random.Generator
     ) -> Prediction:
-        parts = self._find_parts(outputs, points, R_level_camera, wanted, rng)
+        outputs, points = look.outputs, look.points
+        parts = self._find_parts(look, wanted, rng)
         affordance = outputs.affordance[0].softmax(dim=-1)[:, 1].numpy().astype(float)
         if wanted is None:
             part, worth = parts.part, affordance
@@ -414,7 +434,7 @@ class Perception:
             worth = affordance * parts.probability[:, wanted]
         return Prediction(
             points_camera=points,
-            point_index=pick,
+            point_index=look.pick,
             part=parts.part,
             part_probability=parts.probability,
             npcs=parts.npcs,
@@ -422,30 +442,22 @@ class Perception:
             affordance=affordance,
             graspable=affordance >= self.model.config.graspable_from,
             part_boxes=parts.boxes,
-            object_boxes=self._boxes(
-                parts.naocs, points, parts.part, parts.joints, R_level_camera, rng
-            ),
+            object_boxes=self._boxes(look, parts.naocs, parts.part, parts.joints, rng),
             joints=parts.joints,
             grasps=self._ranked_grasps(
                 outputs,
                 points,
                 part,
                 worth,
-                self._anchor_frames(parts, R_level_camera, wanted),
-                R_level_camera,
+                self._anchor_frames(parts, look.R_level_camera, wanted),
+                look.R_level_camera,
                 table_camera,
             ),
-            R_level_camera=R_level_camera,
+            R_level_camera=look.R_level_camera,
         )
 
-    def _find_parts(
-        self,
-        outputs: Outputs,
-        points: Array,
-        R_level_camera: Array,
-        wanted: int | None,
-        rng: np.random.Generator,
-    ) -> _Parts:
+    def _find_parts(self, look: _Look, wanted: int | None, rng: np.random.Generator) -> _Parts:
+        outputs, points = look.outputs, look.points
         num_parts = self.model.config.num_parts
         probability = outputs.segmentation[0].softmax(dim=-1).numpy().astype(float)
         part = probability.argmax(axis=-1)
@@ -458,8 +470,8 @@ class Perception:
 
         joints = []
         type_log = outputs.joint_type[0].log_softmax(dim=-1).numpy()
-        axis_camera = outputs.joint_axis[0].numpy() @ R_level_camera
-        offset_camera = outputs.joint_offset[0].numpy() @ R_level_camera
+        axis_camera = outputs.joint_axis[0].numpy() @ look.R_level_camera
+        offset_camera = outputs.joint_offset[0].numpy() @ look.R_level_camera
         offset_camera = offset_camera * float(outputs.unit)
         for k in range(num_parts):
             on_part = part == k
@@ -482,7 +494,7 @@ class Perception:
             npcs=npcs,
             naocs=naocs,
             joints=tuple(joints),
-            boxes=self._boxes(npcs, points, part, joints, R_level_camera, rng),
+            boxes=self._boxes(look, npcs, part, joints, rng),
         )
 
     def _anchor_frames(
@@ -505,16 +517,15 @@ class Perception:
 
     def _boxes(
         self,
+        look: _Look,
         nocs: Array,
-        points: Array,
         part: NDArray[np.int64],
         joints: Sequence[JointEstimate],
-        R_level_camera: Array,
         rng: np.random.Generator,
     ) -> tuple[PoseFit | None, ...]:
         """One box a part, ``None`` where it was not found."""
         places = [np.flatnonzero(part == k) for k in range(len(joints))]
-        nocs_of_parts, points_of_parts = [nocs[i] for i in places], [points[i] for i in places]
+        nocs_of_parts, points_of_parts = [nocs[i] for i in places], [look.points[i] for i in places]
         fits = tuple(
             fit_pose(x, y, rng) if len(x) >= MIN_PART_POINTS else None
             for x, y in zip(nocs_of_parts, points_of_parts, strict=True)
@@ -528,8 +539,35 @@ class Perception:
             [joint.joint_type for joint in joints],
             [joint.axis_camera for joint in joints],
             self.consistency,
-            up_camera=R_level_camera[2] if self.model.config.upright else None,
+            directions=self._directions(look, fits, places, self.consistency),
         )
+
+    def _directions(
+        self,
+        look: _Look,
+        fits: Sequence[PoseFit | None],
+        places: Sequence[NDArray[np.int64]],
+        consistency: ConsistencyConfig,
+    ) -> list[AxisDirection]:
+        """What is seen of the boxes' axes beside the fits: the vertical, and faces across them."""
+        directions = []
+        if self.model.config.upright:
+            up_camera = look.R_level_camera[2]
+            directions.append(
+                AxisDirection(part=0, axis=2, camera=up_camera, error=consistency.tilt)
+            )
+        errors = self.model.config.face_errors
+        for k, fit in enumerate(fits):
+            if fit is None or not errors:
+                continue
+            cameras, found = face_directions(look.normals[places[k]], fit.T_camera_box[:3, :3])
+            for axis, error in enumerate(errors[self._index][k]):
+                if found[axis] and error is not None:
+                    total = float(np.hypot(error, consistency.face_error))
+                    directions.append(
+                        AxisDirection(part=k, axis=axis, camera=cameras[axis], error=total)
+                    )
+        return directions
 
     def _ranked_grasps(
         self,

@@ -13,6 +13,7 @@ from artgym.errors import InvalidArgumentError, UnknownNameError
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.backbone.classical import DESCRIPTOR_CHANNELS, PointwiseBackbone
 from icaf4_policy.backbone.pointnet2 import BackboneConfig, PointNet2
+from icaf4_policy.faces import FaceErrors
 from icaf4_policy.features import CHANNELS, DEFAULT_FEATURES, Features
 from icaf4_policy.heads.affordance import AffordanceHead
 from icaf4_policy.heads.grasp import GraspHead
@@ -44,6 +45,8 @@ class ModelConfig:
             descriptors go to the heads through a layer of ``backbone.width_out`` features.
         upright: whether the base's z axis points up in all that it was trained with, so that fitted
             boxes are made to stand as well.
+        face_errors: of the faces of each category's parts along each axis of their boxes, radians,
+            see ``faces``; empty where not known, so that faces are not looked at.
         graspable_from: the probability from which on a point is called graspable.
     """
 
@@ -56,6 +59,7 @@ class ModelConfig:
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
     features: Features = DEFAULT_FEATURES
     upright: bool = False
+    face_errors: tuple[FaceErrors, ...] = ()
     graspable_from: float = 0.5
 
     def __post_init__(self) -> None:
@@ -74,6 +78,12 @@ class ModelConfig:
             raise UnknownNameError("scale", self.scale, get_args(Scale))
         if self.features not in CHANNELS:
             raise UnknownNameError("features", self.features, CHANNELS)
+        shapes = [[len(errors) for errors in each] for each in self.face_errors]
+        if self.face_errors and shapes != [[3] * self.num_parts] * len(self.categories):
+            raise InvalidArgumentError(
+                f"face_errors={self.face_errors} must be three of each of {self.num_parts} parts, "
+                f"of {len(self.categories)} categories."
+            )
         if not 0 < self.graspable_from < 1:
             raise InvalidArgumentError(
                 f"graspable_from={self.graspable_from} must be a probability in (0, 1)."

@@ -20,6 +20,7 @@ from icaf4_policy.anchors import AnchorConfig, anchors_from_config
 from icaf4_policy.authors_targets import targets_from_authors
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.dataset import SPARE_POINTS
+from icaf4_policy.faces import face_errors
 from icaf4_policy.features import (
     CHANNELS,
     DEFAULT_FEATURES,
@@ -278,6 +279,21 @@ def set_threshold(model: Icaf4, targets: Sequence[Targets], config: TrainingConf
         model.config = replace(model.config, graspable_from=_THRESHOLDS[best])
 
 
+def set_face_errors(model: Icaf4, targets: Sequence[Targets]) -> None:
+    """Sets how well the faces of parts tell the axes of their boxes, see ``faces``.
+
+    Args:
+        model: the network.
+        targets: of the training samples.
+    """
+    config = model.config
+    errors = tuple(
+        face_errors([t for t in targets if t.category == index], config.num_parts)
+        for index in range(len(config.categories))
+    )
+    model.config = replace(config, face_errors=errors)
+
+
 def train(
     config: TrainingConfig,
     training_samples: Iterable[Sample | AuthorsSample],
@@ -344,6 +360,11 @@ def train(
     draw_plain = _plain_draw(model, config)
     jitter = config.color_jitter if has_color(config.features) else 0.0
     draw = replace(draw_plain, color_jitter=jitter, learn_points=config.learn_points)
+
+    def finish() -> None:
+        set_threshold(model, validation, config)
+        set_face_errors(model, training)
+
     run.complete(
         weights,
         epochs=config.epochs,
@@ -351,7 +372,7 @@ def train(
         validate_every=config.validate_every,
         train_epoch=lambda: _train_epoch(run, model, training, draw, config),
         validate=lambda: _validate(model, validation, draw_plain, config),
-        finish=lambda: set_threshold(model, validation, config),
+        finish=finish,
         facts={
             "config": asdict(config),
             "started_from_sha256": started_from,

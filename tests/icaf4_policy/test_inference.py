@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
+from scipy.spatial import cKDTree
 
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, JOINT_NONE
 from artgym.errors import InvalidArgumentError, NothingSeenError
 from artgym.geometry.rotations import grasp_angle, matrix_from_axis_angle
 from icaf4_policy import cli
 from icaf4_policy.checkpoint import save_model
+from icaf4_policy.cloud import level_points
 from icaf4_policy.drawing import read_rgb
 from icaf4_policy.evaluation import evaluate_grasps, evaluate_sample
 from icaf4_policy.inference import (
@@ -23,6 +25,7 @@ from icaf4_policy.inference import (
 )
 from icaf4_policy.joint_consistency import consistent_fits
 from icaf4_policy.tabletop import fit_table, segment_object
+from icaf4_policy.targets import true_part_boxes
 from tests.icaf4_policy.toy import toy_network, toy_picture
 
 
@@ -187,6 +190,47 @@ def test_boxes_are_made_to_agree_with_the_joints_unless_told_not_to(perception, 
         assert (box is None) == (same is None)
         if box is not None:
             np.testing.assert_array_equal(box.T_camera_box, same.T_camera_box)
+
+
+def with_coordinates(model, sample, distortion, noise):
+    """A network that knows the parts of a sample, and their coordinates but for errors."""
+    points_level, _ = level_points(sample.points_camera, sample.R_level_camera)
+    tree, tell = cKDTree(points_level), model.forward
+    npcs = (sample.npcs.astype(float) - 0.5) @ distortion + 0.5
+    npcs += rng().normal(scale=noise, size=npcs.shape)
+
+    def forward(points, *given, **options):
+        at = tree.query(points[0].numpy())[1]
+        outputs = tell(points, *given, **options)
+        segmentation = 20.0 * np.eye(2)[sample.part[at]]
+        return dataclasses.replace(
+            outputs,
+            segmentation=torch.from_numpy(segmentation[None]).float(),
+            npcs=torch.from_numpy(npcs[at][None, :, None].repeat(2, axis=2)).float(),
+        )
+
+    model.forward = forward
+    return model
+
+
+@pytest.mark.parametrize("features", ["none", "normals"])
+def test_faces_of_parts_turn_their_boxes(perception, sample, features):
+    distortion = np.eye(3)
+    distortion[0, 2] = 0.1
+    model = with_coordinates(toy_network(features), sample, distortion, noise=0.02)
+    knowing = dataclasses.replace(perception, model=model)
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    plain, off = model.config, {}
+    for name, errors in (("not looked at", ()), ("tops", (((None, None, 0.001),) * 2,))):
+        model.config = dataclasses.replace(plain, face_errors=errors)
+        boxes = knowing.predict(*seen, rng=rng()).part_boxes
+        true = true_part_boxes(sample)
+        off[name] = [
+            np.degrees(np.arccos(box.T_camera_box[:3, 2] @ T[:3, 2]))
+            for box, T in zip(boxes, true, strict=True)
+        ]
+    assert min(off["not looked at"]) > 4.0
+    assert max(off["tops"]) < 1.0
 
 
 def test_proposals_differ_from_one_another(perception, picture):

@@ -10,7 +10,7 @@ from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import geodesic_angle, matrix_from_axis_angle
 from artgym.geometry.screw import joint_motion
 from artgym.geometry.transforms import apply, transform_from
-from icaf4_policy.joint_consistency import ConsistencyConfig, consistent_fits
+from icaf4_policy.joint_consistency import AxisDirection, ConsistencyConfig, consistent_fits
 from icaf4_policy.pose_fitting import fit_pose
 
 R_CAMERA_BASE = matrix_from_axis_angle([0.3, 1.0, -2.0])
@@ -35,6 +35,11 @@ def pair(joint_type, q, *, noise=0.0, distortion=0.0, seed=0):
         for x in flat
     ]
     return nocs, points, truth
+
+
+def along(camera, *, part=0, axis=2, error=1e-4):
+    """That an axis points somewhere."""
+    return [AxisDirection(part=part, axis=axis, camera=np.asarray(camera), error=error)]
 
 
 def fits_of(nocs, points):
@@ -114,7 +119,7 @@ def test_an_upright_base_stands_and_is_better_for_it(joint_type, q):
         nocs, points, truth = pair(joint_type, q, noise=0.02, distortion=0.04, seed=seed)
         fits = fits_of(nocs, points)
         given = (fits, nocs, points, [JOINT_NONE, CODES[joint_type]], AXES_CAMERA)
-        found = consistent_fits(*given, ConsistencyConfig(tilt=1e-4), up_camera=up)
+        found = consistent_fits(*given, directions=along(up))
         assert np.degrees(np.arccos(found[0].T_camera_box[:3, 2] @ up)) < 0.05
         before += errors_deg(consistent_fits(*given), truth)
         after += errors_deg(found, truth)
@@ -124,8 +129,8 @@ def test_an_upright_base_stands_and_is_better_for_it(joint_type, q):
 def test_an_upright_base_needs_no_joints():
     nocs, points, truth = pair("revolute", 1.0, noise=0.02, distortion=0.04)
     fits = fits_of(nocs, points)
-    up = R_CAMERA_BASE[:, 2]
-    found = consistent_fits(fits, nocs, points, [JOINT_NONE] * 2, AXES_CAMERA, up_camera=up)
+    upright = along(R_CAMERA_BASE[:, 2])
+    found = consistent_fits(fits, nocs, points, [JOINT_NONE] * 2, AXES_CAMERA, directions=upright)
     assert errors_deg(found, truth)[0] < errors_deg(fits, truth)[0]
     assert found[1] is fits[1]
 
@@ -133,13 +138,48 @@ def test_an_upright_base_needs_no_joints():
 def test_a_vertical_that_the_points_contradict_is_left_out():
     nocs, points, truth = pair("revolute", 1.2, noise=0.02)
     fits = fits_of(nocs, points)
-    lying = R_CAMERA_BASE[:, 1]
+    lying = along(R_CAMERA_BASE[:, 1])
     codes = [JOINT_NONE, JOINT_REVOLUTE]
-    found = consistent_fits(fits, nocs, points, codes, AXES_CAMERA, up_camera=lying)
+    found = consistent_fits(fits, nocs, points, codes, AXES_CAMERA, directions=lying)
     expected = consistent_fits(fits, nocs, points, codes, AXES_CAMERA)
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one.T_camera_box, other.T_camera_box)
     assert max(errors_deg(found, truth)) < 1.0
+
+
+def test_directions_of_one_part_help_the_other_across_a_slide():
+    before, after = [], []
+    for seed in range(20):
+        nocs, points, truth = pair("prismatic", 0.2, noise=0.02, distortion=0.04, seed=seed)
+        fits = fits_of(nocs, points)
+        seen = along(truth[1][:3, 0], part=1, axis=0) + along(truth[1][:3, 1], part=1, axis=1)
+        given = (fits, nocs, points, [JOINT_NONE, JOINT_PRISMATIC], AXES_CAMERA)
+        before += errors_deg(consistent_fits(*given), truth)
+        after += errors_deg(consistent_fits(*given, directions=seen), truth)
+    assert np.mean(before) > 1.0
+    assert np.max(after) < 0.1
+
+
+def test_a_direction_counts_by_its_error():
+    nocs, points, truth = pair("revolute", 1.0, noise=0.02, distortion=0.04)
+    fits = fits_of(nocs, points)
+    given = (fits, nocs, points, [JOINT_NONE] * 2, AXES_CAMERA)
+    up = truth[0][:3, 2]
+    off = [
+        np.arccos(
+            consistent_fits(*given, directions=along(up, error=error))[0].T_camera_box[:3, 2] @ up
+        )
+        for error in (1e-4, 0.02, 0.1, 10.0)
+    ]
+    assert np.all(np.diff(off) > 0)
+    assert off[-1] == pytest.approx(np.arccos(fits[0].T_camera_box[:3, 2] @ up), rel=1e-2)
+
+
+def test_directions_of_a_part_without_fit_are_passed_over():
+    nocs, points, _ = pair("revolute", 1.0, noise=0.02)
+    fits = (None, fits_of(nocs, points)[1])
+    given = (fits, nocs, points, [JOINT_NONE, JOINT_REVOLUTE], AXES_CAMERA)
+    assert consistent_fits(*given, directions=along(R_CAMERA_BASE[:, 2])) == fits
 
 
 def test_lengths_are_checked():

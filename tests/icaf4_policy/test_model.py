@@ -234,3 +234,10 @@ def test_overfits_one_sample(network):
 def test_impossible_configurations_are_refused(field, value):
     with pytest.raises(InvalidArgumentError, match=re.escape(f"{field}={value}")):
         dataclasses.replace(SMALL, **{field: value})
+
+
+@pytest.mark.parametrize("errors", [((),), (((0.1, 0.1, 0.1),),), (((0.1, None),) * 2,)])
+def test_face_errors_are_three_of_each_part(errors):
+    with pytest.raises(InvalidArgumentError, match=r"face_errors=.* three of each of 2 parts"):
+        dataclasses.replace(SMALL, face_errors=errors)
+    dataclasses.replace(SMALL, face_errors=(((0.1, None, 0.2),) * 2,))

@@ -13,6 +13,7 @@ from icaf4_policy import cli, commands, training_run
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
 from icaf4_policy.checkpoint import description_path, load_model, save_model
+from icaf4_policy.faces import face_errors
 from icaf4_policy.inference import Perception
 from icaf4_policy.metrics import class_ious
 from icaf4_policy.model import Icaf4, ModelConfig
@@ -156,6 +157,21 @@ def test_objects_stand_upright_if_all_of_the_training_do(tmp_path, samples):
         weights = tmp_path / f"{name}.safetensors"
         train(dataclasses.replace(CONFIG, epochs=1), training, validation, weights)
         assert load_model(weights)[0].config.upright is upright
+
+
+def test_faces_are_looked_at_as_they_are_in_training(tmp_path, samples):
+    training, validation = samples
+    many = [*training] * (20 // len(training) + 1)
+    model = train(
+        dataclasses.replace(CONFIG, epochs=1), many, validation, tmp_path / "toy.safetensors"
+    )
+    targets = [
+        targets_from_sample(s, ("toy",), anchors_from_config(CONFIG.anchors), 4096) for s in many
+    ]
+    expected = face_errors(targets, 2)
+    assert model.config.face_errors == (expected,)
+    assert any(error is not None for of_part in expected for error in of_part)
+    assert load_model(tmp_path / "toy.safetensors")[0].config == model.config
 
 
 def test_points_are_called_graspable_where_that_agrees_best_with_the_validation(tmp_path, samples):

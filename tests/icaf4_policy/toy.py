@@ -18,6 +18,7 @@ from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.geometry.screw import joint_motion
 from artgym.geometry.transforms import apply, invert, transform_from, translation
 from icaf4_policy.backbone.pointnet2 import BackboneConfig
+from icaf4_policy.features import DEFAULT_FEATURES, Features
 from icaf4_policy.model import Icaf4, ModelConfig
 
 WIDTH, HEIGHT = 160, 120
@@ -34,7 +35,7 @@ def _box_surface(size: np.ndarray, count: int, rng: np.random.Generator):
     return points * size, normals
 
 
-def toy_network() -> Icaf4:
+def toy_network(features: Features = DEFAULT_FEATURES) -> Icaf4:
     """A small network of the object, not trained, the same each time."""
     torch.manual_seed(0)
     config = ModelConfig(
@@ -42,6 +43,7 @@ def toy_network() -> Icaf4:
         num_parts=2,
         length_units=(0.25,),
         num_points=512,
+        features=features,
         backbone=BackboneConfig(centers=(64, 16), neighbors=8),
     )
     return Icaf4(config).eval()
