@@ -391,6 +391,7 @@ class Perception:
         grasp_points: int,
         part: int | None = None,
     ) -> _Look:
+        """Shows a cloud to the network, and asks for grasps at so many points (on a part)."""
         points_camera, colors = np.asarray(points_camera, dtype=float), np.asarray(colors)
         if points_camera.ndim != 2 or len(points_camera) < MIN_OBJECT_POINTS:
             raise InvalidArgumentError(
