@@ -18,7 +18,7 @@ from artgym.geometry.camera import project
 from benchmarks.episodes import EpisodeTask, run_episode
 
 if TYPE_CHECKING:
-    from icaf4_policy.inference import Prediction
+    from icaf4_policy.prediction import Prediction
 
 _FRAMES_A_SECOND = 20
 _DRAWN_GRASPS = 10

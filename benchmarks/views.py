@@ -21,8 +21,8 @@ from benchmarks.constrained_fit import ConstrainedFitConfig, fit_parts
 from benchmarks.policies import load_perception
 
 if TYPE_CHECKING:
-    from icaf4_policy.inference import Prediction
     from icaf4_policy.pose_fitting import PoseFit
+    from icaf4_policy.prediction import Prediction
 
 
 #: The one method whose parts are fitted by the joint-constrained optimizer, and without a pose of

@@ -22,7 +22,8 @@ from icaf4_policy.backbone.classical import DESCRIPTOR_CHANNELS
 from icaf4_policy.checkpoint import description_path
 from icaf4_policy.detector.config import DetectorTrainingConfig
 from icaf4_policy.features import Features, described
-from icaf4_policy.inference import Perception, Prediction
+from icaf4_policy.inference import Perception
+from icaf4_policy.prediction import Prediction
 from icaf4_policy.shipped import weights_path
 from icaf4_policy.training import TrainingConfig
 from icaf4_policy.training import train as run_training

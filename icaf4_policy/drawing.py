@@ -14,7 +14,7 @@ from artgym.datasets.drawing import PART_COLORS, draw_line, hand_lines
 from artgym.errors import DamagedFileError, InvalidArgumentError
 from artgym.geometry.camera import project
 from artgym.geometry.transforms import transform_from
-from icaf4_policy.inference import Prediction
+from icaf4_policy.prediction import Prediction
 
 _AXIS_COLOR, _BEST_COLOR, _GRASP_COLOR = (255, 255, 0), (0, 255, 0), (0, 170, 220)
 #: Half the length of a drawn axis, metres.

@@ -15,8 +15,9 @@ from artgym.datasets.sample import (
     Sample,
 )
 from icaf4_policy import metrics
-from icaf4_policy.inference import MIN_PART_POINTS, Perception, PointGrasps, Prediction
+from icaf4_policy.inference import MIN_PART_POINTS, Perception
 from icaf4_policy.pose_fitting import PoseFit
+from icaf4_policy.prediction import PointGrasps, Prediction
 from icaf4_policy.targets import true_object_boxes, true_part_boxes
 
 Array = NDArray[np.floating]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,13 +10,12 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from artgym.datasets.sample import JOINT_NONE, JOINT_REVOLUTE, level_from_camera
+from artgym.datasets.sample import level_from_camera
 from artgym.errors import InvalidArgumentError, UnknownNameError
-from artgym.geometry.rotations import geodesic_angle, grasp_angle
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points, surface_normals
-from icaf4_policy.collisions import CollisionConfig, hand_is_free
+from icaf4_policy.collisions import hand_is_free
 from icaf4_policy.faces import face_directions
 from icaf4_policy.features import (
     given_normals,
@@ -25,163 +24,17 @@ from icaf4_policy.features import (
     point_inputs,
 )
 from icaf4_policy.joint_consistency import AxisDirection, ConsistencyConfig, consistent_fits
-from icaf4_policy.metrics import expected_iou
+from icaf4_policy.joint_votes import joint_from_votes
 from icaf4_policy.model import Icaf4, Outputs
 from icaf4_policy.pose_fitting import PoseFit, fit_pose
+from icaf4_policy.prediction import NO_JOINT, Grasps, JointEstimate, PointGrasps, Prediction
+from icaf4_policy.proposals import ProposalConfig, diverse
 from icaf4_policy.tabletop import MIN_OBJECT_POINTS, ObjectView, segment_object
 
 Array = NDArray[np.floating]
 
 #: A part is found if this many points are on it.
 MIN_PART_POINTS = 12
-#: Angle between two estimates of the same axes that makes them a third as sure, radians.
-_DOUBT = float(np.radians(5.0))
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProposalConfig:
-    """How grasps are ranked and thinned out.
-
-    Attributes:
-        points: of the cloud, this many of highest affordance are asked for grasps.
-        count: J, the most proposals to return.
-        distance: metres, and
-        angle: radians; a proposal nearer than both to a better one is dropped.
-        collisions: when the open hand would be inside what is seen, the proposal is dropped; None
-            keeps it.
-    """
-
-    points: int = 384
-    count: int = 64
-    distance: float = 0.02
-    angle: float = float(np.radians(25.0))
-    collisions: CollisionConfig | None = field(default_factory=CollisionConfig)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class JointEstimate:
-    """The joint that moves one part.
-
-    Attributes:
-        joint_type: code of ``Sample.joint_type``; -1 also where the part was not found.
-        axis_camera: (3,), unit, opening direction positive; zeros without a joint.
-        pivot_camera: (3,), metres, a point of the axis near the part; for a slide, the part's
-            middle; zeros without a joint.
-    """
-
-    joint_type: int
-    axis_camera: Array
-    pivot_camera: Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Grasps:
-    """Proposals, best first. J of them.
-
-    Attributes:
-        points_camera: (J, 3), metres, surface points.
-        R_camera_grasp: (J, 3, 3), columns (x, y = closing, z = approach).
-        scores: (J,), probability that the point can be grasped times that of the anchor, and times
-            that of the part where one was asked for.
-        parts: int64 (J,), predicted part of the point, or the one that was asked for.
-    """
-
-    points_camera: Array
-    R_camera_grasp: Array
-    scores: Array
-    parts: NDArray[np.int64]
-
-    def of_part(self, part: int) -> Grasps:
-        """The proposals on one part, still best first."""
-        keep = self.parts == part
-        return Grasps(
-            points_camera=self.points_camera[keep],
-            R_camera_grasp=self.R_camera_grasp[keep],
-            scores=self.scores[keep],
-            parts=self.parts[keep],
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PointGrasps:
-    """Grasps at every point of a cloud. N points, J grasps each, best first.
-
-    Attributes:
-        points_camera: (N, 3), metres.
-        point_index: int64 (N,), into the points that were given.
-        affordance: (N,), probability that the point can be grasped.
-        graspable: bool (N,), whether the network calls it so.
-        R_camera_grasp: (N, J, 3, 3).
-        scores: (N, J), probability of each anchor.
-    """
-
-    points_camera: Array
-    point_index: NDArray[np.int64]
-    affordance: Array
-    graspable: NDArray[np.bool_]
-    R_camera_grasp: Array
-    scores: Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Prediction:
-    """What the network says about one view. N points, K parts (base = 0).
-
-    Attributes:
-        points_camera: (N, 3), metres.
-        point_index: int64 (N,), into the points that were given.
-        part: int64 (N,), and part_probability: (N, K).
-        npcs: (N, 3) and naocs: (N, 3), of the predicted part, 0.5 at the box's centre.
-        affordance: (N,), probability that the point can be grasped.
-        graspable: bool (N,), whether the network calls it so.
-        part_boxes: K fits of the parts' canonical boxes (``None`` where a part was not found): axes
-            and centre.
-        object_boxes: K fits of the object's rest-state box, each from the points of one part: the
-            pose the object would have if the whole moved with that part; that of part 0 is the
-            object's pose.
-        joints: K joints, ``JOINT_NONE`` for the base.
-        grasps: ranked proposals.
-        R_level_camera: (3, 3).
-    """
-
-    points_camera: Array
-    point_index: NDArray[np.int64]
-    part: NDArray[np.int64]
-    part_probability: Array
-    npcs: Array
-    naocs: Array
-    affordance: Array
-    graspable: NDArray[np.bool_]
-    part_boxes: tuple[PoseFit | None, ...]
-    object_boxes: tuple[PoseFit | None, ...]
-    joints: tuple[JointEstimate, ...]
-    grasps: Grasps
-    R_level_camera: Array
-
-    def part_confidences(self) -> Array:
-        """The expected intersection over union (K,) of each part's points; 0 of one without any."""
-        called = self.part[:, None] == np.arange(self.part_probability.shape[1])
-        return expected_iou(self.part_probability, called)
-
-    def pose_confidences(self) -> Array:
-        """How sure the boxes (K,) of each part are, in [0, 1]; 0 of a part that was not found.
-
-        Of both boxes of a part, its own and that of the object as it moves with the part, the axes
-        are the same, and their coordinates are predicted apart: it is the expected intersection
-        over union of the part's points, times the share of them that agrees with its box, less the
-        farther the axes of the two are from each other.
-        """
-        confidences = np.zeros(len(self.part_boxes))
-        for k, boxes in enumerate(zip(self.part_boxes, self.object_boxes, strict=True)):
-            own, with_part = boxes
-            if own is not None and with_part is not None:
-                apart = geodesic_angle(own.T_camera_box[:3, :3], with_part.T_camera_box[:3, :3])
-                confidences[k] = own.inlier_share * np.exp(-apart / _DOUBT)
-        return confidences * self.part_confidences()
-
-    def affordance_confidence(self) -> float:
-        """The expected intersection over union of the points that are called graspable."""
-        return float(expected_iou(self.affordance[:, None], self.graspable[:, None])[0])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -477,10 +330,10 @@ class Perception:
         for k in range(num_parts):
             on_part = part == k
             if on_part.sum() < MIN_PART_POINTS:
-                joints.append(_NO_JOINT)
+                joints.append(NO_JOINT)
                 continue
             joints.append(
-                _joint_from_votes(
+                joint_from_votes(
                     type_log[on_part],
                     axis_camera[on_part],
                     points[on_part] + offset_camera[on_part],
@@ -616,77 +469,3 @@ class Perception:
             scores=scores[row[chosen], anchor[chosen]].astype(float),
             parts=part[source],
         )
-
-
-_NO_JOINT = JointEstimate(joint_type=JOINT_NONE, axis_camera=np.zeros(3), pivot_camera=np.zeros(3))
-
-
-def diverse(
-    points: Array,
-    R_grasps: Array,
-    config: ProposalConfig,
-    fits: Callable[[int], bool] = lambda _: True,
-) -> NDArray[np.int64]:
-    """Indices of grasps, best first, none near a better one (non-maximum suppression).
-
-    Args:
-        points: (n, 3), metres, best first.
-        R_grasps: (n, 3, 3).
-        config: how near is near, and how many to keep.
-        fits: whether the grasp of an index may be kept at all.
-    """
-    alive = np.ones(len(points), dtype=bool)
-    chosen = []
-    while alive.any() and len(chosen) < config.count:
-        best = int(np.argmax(alive))
-        alive[best] = False
-        if not fits(best):
-            continue
-        chosen.append(best)
-        near = np.flatnonzero(alive)
-        near = near[((points[near] - points[best]) ** 2).sum(axis=-1) < config.distance**2]
-        alive[near[grasp_angle(R_grasps[best], R_grasps[near]) < config.angle]] = False
-    return np.array(chosen, dtype=np.int64)
-
-
-def _weighted_median(values: Array, weights: Array) -> Array:
-    """Weighted median of each column of ``values`` (n, d)."""
-    order = np.argsort(values, axis=0)
-    share = np.cumsum(weights[order], axis=0)
-    middle = np.argmax(share >= 0.5 * share[-1], axis=0)
-    return np.take_along_axis(values, np.take_along_axis(order, middle[None], axis=0), axis=0)[0]
-
-
-def _joint_from_votes(
-    type_log: Array, axes: Array, pivots: Array, points: Array, weights: Array, *, moves: bool
-) -> JointEstimate:
-    """One joint from the votes of a part's points.
-
-    The type has the largest mean log-probability; the axis is the mean direction of the votes
-    within 30 degrees of their component-wise median, and the pivot the median of theirs.
-
-    Args:
-        type_log: (n, 3), log-probabilities of the codes of ``Sample.joint_type`` plus one.
-        axes: (n, 3), camera frame.
-        pivots: (n, 3), nearest points of the axis, camera frame, metres.
-        points: (n, 3), camera frame, metres.
-        weights: (n,), probability that each point is on the part.
-        moves: whether the part is known to have a joint.
-    """
-    votes = (weights[:, None] * type_log).sum(axis=0)
-    if moves:
-        votes[0] = -np.inf
-    joint_type = int(np.argmax(votes)) + JOINT_NONE
-    if joint_type == JOINT_NONE:
-        return _NO_JOINT
-    units = axes / np.maximum(np.linalg.norm(axes, axis=-1, keepdims=True), 1e-9)
-    middle = _weighted_median(units, weights)
-    middle = middle / max(np.linalg.norm(middle), 1e-9)
-    agrees = units @ middle > np.cos(np.radians(30.0))
-    mean = (weights * agrees) @ units if agrees.any() else middle
-    located = pivots if joint_type == JOINT_REVOLUTE else points
-    return JointEstimate(
-        joint_type=joint_type,
-        axis_camera=mean / max(np.linalg.norm(mean), 1e-9),
-        pivot_camera=_weighted_median(located, weights),
-    )

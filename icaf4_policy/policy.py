@@ -25,7 +25,8 @@ from artgym.geometry.camera import points_from_depth
 from artgym.geometry.grasps import T_GRASP_TCP
 from artgym.geometry.rotations import frame_from_z, grasp_angle
 from artgym.geometry.screw import joint_motion
-from icaf4_policy.inference import Perception, Prediction
+from icaf4_policy.inference import Perception
+from icaf4_policy.prediction import Prediction
 from icaf4_policy.shipped import weights_path
 
 Array = NDArray[np.floating]

@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from artgym.datasets.sample import level_from_camera
 from artgym.geometry.camera import points_from_depth
 from icaf4_policy.detector.inference import Detection, Detector
-from icaf4_policy.inference import Perception, Prediction
+from icaf4_policy.inference import Perception
+from icaf4_policy.prediction import Prediction
 from icaf4_policy.shipped import DETECTOR, weights_path
 from icaf4_policy.tabletop import HEIGHT_ABOVE_TABLE, MIN_OBJECT_POINTS, fit_table
 

@@ -18,9 +18,10 @@ from benchmarks.object_table import MEAN, ObjectTableConfig, _means, report, tab
 from benchmarks.paper import METHOD_LABELS, TABLE_1
 from benchmarks.report import object_table_block
 from benchmarks.views import _optimized
-from icaf4_policy.inference import JointEstimate, Perception
+from icaf4_policy.inference import Perception
 from icaf4_policy.metrics import pose_errors
 from icaf4_policy.pose_fitting import PoseFit
+from icaf4_policy.prediction import JointEstimate
 from icaf4_policy.targets import true_part_boxes
 from tests.icaf4_policy.toy import toy_network, toy_sample
 

@@ -10,9 +10,9 @@ import pytest
 from artgym.datasets.sample import AFFORDANCE_YES
 from benchmarks.scene_table import COLUMNS, SceneScore, _pixels, compared, owners, precision_rows
 from icaf4_policy.detector.evaluation import true_detections
-from icaf4_policy.inference import PointGrasps, Prediction
 from icaf4_policy.metrics import interpolated_precision
 from icaf4_policy.pose_fitting import PoseFit
+from icaf4_policy.prediction import PointGrasps, Prediction
 from icaf4_policy.scenes import ScenePerception, SeenObject
 from icaf4_policy.targets import true_object_boxes, true_part_boxes
 from tests.icaf4_policy.toy import toy_picture

@@ -16,14 +16,9 @@ from icaf4_policy.checkpoint import save_model
 from icaf4_policy.cloud import level_points
 from icaf4_policy.drawing import read_rgb
 from icaf4_policy.evaluation import evaluate_grasps, evaluate_sample
-from icaf4_policy.inference import (
-    MIN_PART_POINTS,
-    Perception,
-    ProposalConfig,
-    _joint_from_votes,
-    diverse,
-)
+from icaf4_policy.inference import MIN_PART_POINTS, Perception
 from icaf4_policy.joint_consistency import consistent_fits
+from icaf4_policy.proposals import ProposalConfig
 from icaf4_policy.tabletop import fit_table, segment_object
 from icaf4_policy.targets import true_part_boxes
 from tests.icaf4_policy.toy import toy_network, toy_picture
@@ -242,19 +237,6 @@ def test_proposals_differ_from_one_another(perception, picture):
     assert near.sum() == len(grasps.scores)  # each with itself
 
 
-def test_the_best_of_near_grasps_is_kept():
-    points = np.array([[0, 0, 0], [0.001, 0, 0], [1, 0, 0]], dtype=float)
-    rotations = np.stack([np.eye(3)] * 3)
-    np.testing.assert_array_equal(diverse(points, rotations, ProposalConfig()), [0, 2])
-
-
-def test_what_does_not_fit_is_passed_over():
-    points = np.array([[0.0, 0, 0], [0.001, 0, 0], [0.3, 0, 0]])
-    R_grasps = np.tile(np.eye(3), (3, 1, 1))
-    chosen = diverse(points, R_grasps, ProposalConfig(), lambda index: index != 0)
-    np.testing.assert_array_equal(chosen, [1, 2])
-
-
 def test_point_grasps_and_ranked_grasps_agree(perception, sample):
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
     keeps_all = dataclasses.replace(perception.proposals, collisions=None)
@@ -318,22 +300,6 @@ def test_a_small_cloud_is_filled_up(perception, sample):
     )
     assert len(prediction.points_camera) == 512
     assert set(prediction.point_index) == set(range(200))
-
-
-def test_joint_votes_survive_outliers():
-    generator = np.random.default_rng(0)
-    axis, pivot = np.array([0, 0.6, 0.8]), np.array([0.1, 0.2, 0.5])
-    axes = np.tile(axis, (100, 1))
-    pivots = pivot + generator.normal(scale=0.02, size=(100, 1)) * axis
-    axes[:30], pivots[:30] = generator.normal(size=(30, 3)), generator.normal(size=(30, 3))
-    type_log = np.log(np.tile([0.1, 0.1, 0.8], (100, 1)))
-    joint = _joint_from_votes(type_log, axes, pivots, pivots, np.ones(100), moves=False)
-    assert joint.joint_type == 1
-    assert np.degrees(np.arccos(min(joint.axis_camera @ axis, 1.0))) < 3
-    assert np.linalg.norm(np.cross(joint.pivot_camera - pivot, axis)) < 0.02
-    votes = (type_log[:, ::-1], axes, pivots, pivots, np.ones(100))
-    assert _joint_from_votes(*votes, moves=False).joint_type == JOINT_NONE
-    assert _joint_from_votes(*votes, moves=True).joint_type != JOINT_NONE
 
 
 def test_evaluation_gives_every_metric(perception, sample):

@@ -12,8 +12,9 @@ from artgym.datasets.sample import JOINT_PRISMATIC
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
 from artgym.geometry.transforms import transform_from
-from icaf4_policy.inference import Grasps, JointEstimate, Perception
+from icaf4_policy.inference import Perception
 from icaf4_policy.policy import Icaf4Policy
+from icaf4_policy.prediction import Grasps, JointEstimate
 from tests.icaf4_policy.toy import toy_network
 
 #: The end of the way of a part that slides along x, metres.
