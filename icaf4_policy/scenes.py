@@ -9,6 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from artgym.datasets.sample import level_from_camera
@@ -26,6 +28,8 @@ Mask = NDArray[np.bool_]
 _REACH = 0.06
 #: Loose pieces of a mask that are smaller than this share of it are left out.
 _CRUMB = 0.05
+#: Beside each other in a picture, what is so much nearer or farther is another piece, metres.
+_JUMP = 0.05
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +115,7 @@ class ScenePerception:
         objects = []
         for number, detection in enumerate(detections):
             others = [each.mask for i, each in enumerate(detections) if i != number]
-            mask = _outlined(detection.mask, others, is_seen & stands_out)
+            mask = _outlined(detection.mask, others, is_seen & stands_out, depth)
             if detection.category not in self.perceptions or mask.sum() < MIN_OBJECT_POINTS:
                 continue
             perception, points = self.perceptions[detection.category], points_camera[mask]
@@ -126,11 +130,12 @@ class ScenePerception:
         return objects
 
 
-def _outlined(mask: Mask, others: Sequence[Mask], stands_out: Mask) -> Mask:
+def _outlined(mask: Mask, others: Sequence[Mask], stands_out: Mask, depth: Array) -> Mask:
     """A detection's mask (H, W) with the outline that depth gives it.
 
-    The detector draws masks on a coarse grid, and cuts off corners and thin ends: what stands out
-    of the table beside a mask, and is in no other, belongs to it.
+    The detector draws masks on a coarse grid: it cuts off corners and thin ends, and takes in edges
+    of what is in front or behind. What stands out of the table beside a mask, and is in no other,
+    belongs to it; loose crumbs do not.
     """
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     if not len(rows):
@@ -141,12 +146,28 @@ def _outlined(mask: Mask, others: Sequence[Mask], stands_out: Mask) -> Mask:
     for other in others:
         beside &= ~other
     outlined = (mask | beside) & stands_out
-    _, pieces = cv2.connectedComponents(outlined.astype(np.uint8), connectivity=4)
-    piece = pieces.astype(np.int64)
-    sizes = np.bincount(piece.ravel())
-    # Piece 0 is the rest. Crumbs of something else would make the cloud of another size.
-    sizes[0] = 0
-    return (sizes > _CRUMB * sizes.sum())[piece]
+    piece = _pieces(outlined, depth)
+    sizes = np.bincount(piece)
+    outlined[outlined] = (sizes > _CRUMB * sizes.sum())[piece]
+    return outlined
+
+
+def _pieces(mask: Mask, depth: Array) -> NDArray[np.integer]:
+    """For each pixel of a mask (H, W), row by row, the number of its piece.
+
+    Pixels hang together where they lie side by side at much the same depth (H, W).
+    """
+    count = int(mask.sum())
+    number = np.full(mask.shape, -1)
+    number[mask] = np.arange(count)
+    pairs = []
+    for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        hang = mask[one] & mask[other] & (np.abs(depth[one] - depth[other]) < _JUMP)
+        pairs.append(np.stack([number[one][hang], number[other][hang]]))
+    first, second = np.concatenate(pairs, axis=1)
+    links = coo_array((np.ones(len(first), dtype=bool), (first, second)), shape=(count, count))
+    piece: NDArray[np.integer] = connected_components(links, directed=False)[1]
+    return piece
 
 
 def _spread(

@@ -70,6 +70,19 @@ def test_depth_gives_a_blunt_mask_its_outline(picture):
     assert not seen.part_mask[taken].any()
 
 
+def test_what_stands_before_an_object_is_no_crumb_of_it(picture):
+    detector = TruthfulDetector(picture)
+    (found,) = detector.found
+    crumb = np.zeros_like(found.mask)
+    row, column = (int(np.median(index)) for index in np.nonzero(found.mask))
+    crumb[row - 1 : row + 2, column - 2 : column + 3] = True
+    assert (crumb & found.mask).sum() == crumb.sum() < 0.05 * found.mask.sum()
+    depth = np.where(crumb, picture.depth - 0.1, picture.depth)
+    (seen,) = look(dataclasses.replace(picture, depth=depth), {"toy": perception()}, detector)
+    assert not seen.part_mask[crumb].any()
+    assert (seen.part_mask[found.mask & ~crumb] > 0).mean() > 0.9
+
+
 def test_the_same_scene_gives_the_same(picture):
     first, second = (look(picture, {"toy": perception()})[0] for _ in range(2))
     np.testing.assert_array_equal(first.part_mask, second.part_mask)
