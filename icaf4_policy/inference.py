@@ -45,14 +45,14 @@ class _Look:
         outputs: what it said.
         points: (N, 3), camera frame, metres.
         pick: int64 (N,), which of the given points they are.
-        normals: (N, 3), unit, camera frame.
+        normals: (N, 3), unit, camera frame; ``None`` for a network that knows no faces.
         R_level_camera: (3, 3).
     """
 
     outputs: Outputs
     points: Array
     pick: NDArray[np.int64]
-    normals: Array
+    normals: Array | None
     R_level_camera: Array
 
 
@@ -263,15 +263,16 @@ class Perception:
             part=part,
         )
         R_level_camera = np.asarray(R_level_camera, dtype=float)
+        normals = None
+        if config.face_errors and has_normals(config.features):
+            normals = given_normals(given) @ R_level_camera
+        elif config.face_errors:
+            normals = surface_normals(points_camera, pick, np.zeros(3))
         return _Look(
             outputs=outputs,
             points=points_camera[pick],
             pick=pick,
-            normals=(
-                given_normals(given) @ R_level_camera
-                if has_normals(config.features)
-                else surface_normals(points_camera, pick, np.zeros(3))
-            ),
+            normals=normals,
             R_level_camera=R_level_camera,
         )
 
@@ -410,12 +411,14 @@ class Perception:
             directions.append(
                 AxisDirection(part=0, axis=2, camera=up_camera, error=consistency.tilt)
             )
-        errors = self.model.config.face_errors
+        if look.normals is None:
+            return directions
+        errors = self.model.config.face_errors[self._index]
         for k, fit in enumerate(fits):
-            if fit is None or not errors:
+            if fit is None:
                 continue
             cameras, found = face_directions(look.normals[places[k]], fit.T_camera_box[:3, :3])
-            for axis, error in enumerate(errors[self._index][k]):
+            for axis, error in enumerate(errors[k]):
                 if found[axis] and error is not None:
                     total = float(np.hypot(error, consistency.face_error))
                     directions.append(

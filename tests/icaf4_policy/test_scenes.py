@@ -83,6 +83,15 @@ def test_what_stands_before_an_object_is_no_crumb_of_it(picture):
     assert (seen.part_mask[found.mask & ~crumb] > 0).mean() > 0.9
 
 
+def test_a_mask_on_the_bare_table_is_no_object(picture):
+    detector = TruthfulDetector(picture)
+    (found,) = detector.found
+    far = cv2.dilate(found.mask.astype(np.uint8), np.ones((25, 25), np.uint8)) == 0
+    detector.found = [dataclasses.replace(found, mask=far & (picture.depth > 0))]
+    assert detector.found[0].mask.sum() > 1000
+    assert look(picture, {"toy": perception()}, detector) == []
+
+
 def test_the_same_scene_gives_the_same(picture):
     first, second = (look(picture, {"toy": perception()})[0] for _ in range(2))
     np.testing.assert_array_equal(first.part_mask, second.part_mask)
