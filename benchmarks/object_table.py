@@ -126,7 +126,8 @@ class ObjectTableConfig:
 
     def weights_of(self, category: str) -> dict[str, Path | None]:
         """The folder of each method's weights for a category; None for the shipped ones."""
-        folders = {"icaf4": self.weights and self.weights.absolute()}
+        own = self.weights and self.weights.absolute()
+        folders = {"icaf4": own, "no_faces": own}
         if self.work and category in self.baselines:
             folders |= {m: self.work.absolute() / m for m in METHOD_LABELS if m not in folders}
         return folders
@@ -216,7 +217,7 @@ def category_table(category: str, result: Mapping[str, Any]) -> Table:
         table.add_column(heading, justify="right")
     for method, values in result["metrics"][category].items():
         table.add_row(METHOD_LABELS[method], *_cells(values))
-        paper = result["paper"][method].get(category)
+        paper = result["paper"].get(method, {}).get(category)
         if paper:
             # The paper's translations are in another unit.
             table.add_row("  paper", *_cells(paper), style="dim")

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-#: The methods of Table 1, as they are printed.
+#: The methods of Table 1 and an ablation, as they are printed.
 METHOD_LABELS: Mapping[str, str] = {
     "icaf4": "ICAF-4",
+    "no_faces": "without faces",
     "ah_where": "AH-Where",
     "daisy": "DAISY",
     "fpfh": "FPFH",

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
 
 #: The one method whose parts are fitted by the joint-constrained optimizer, and without a pose of
-#: the object; what else tells the methods apart stands in their weights.
-_OPTIMIZED = "ah_where"
+#: the object; and the one whose boxes are not turned to the faces that are seen. What else tells
+#: the methods apart stands in their weights.
+_OPTIMIZED, _FACELESS = "ah_where", "no_faces"
 
 #: It takes a second or so a view.
 _OPTIMIZER = ConstrainedFitConfig(hypotheses=50)
@@ -159,6 +160,9 @@ def _score(
     rng = np.random.default_rng([task.seed, zlib.crc32(task.object_id.encode()), number])
     (sample,) = picture.samples
     sample = described(picture, sample, perception.model.config.features)
+    if method == _FACELESS:
+        consistency = replace(perception.consistency, faces=False)
+        perception = replace(perception, consistency=consistency)
     refit = (lambda prediction: _optimized(prediction, rng)) if method == _OPTIMIZED else None
     row, prediction = evaluate_sample(perception, sample, rng, refit=refit)
     for name in ("part_translation", "object_translation", "joint_pivot"):

@@ -411,7 +411,7 @@ class Perception:
             directions.append(
                 AxisDirection(part=0, axis=2, camera=up_camera, error=consistency.tilt)
             )
-        if look.normals is None:
+        if look.normals is None or not consistency.faces:
             return directions
         errors = self.model.config.face_errors[self._index]
         for k, fit in enumerate(fits):

@@ -45,6 +45,7 @@ class ConsistencyConfig:
         axis_error: radians, standard deviation of a predicted axis in each direction.
         tilt: radians, standard deviation, in each direction, of an upright base's z axis from
             where the vertical is taken to be.
+        faces: whether faces count.
         face_error: radians, the same of a face's direction beside what ``faces.FaceErrors`` has.
         worse: a part's fit may have its root-mean-square error grow by this share; a link that
             asks for more is left out. Points on a flat part hardly tell its depth from a turn, so
@@ -54,6 +55,7 @@ class ConsistencyConfig:
     independent: float = 10.0
     axis_error: float = float(np.radians(6.0))
     tilt: float = float(np.radians(1.0))
+    faces: bool = True
     face_error: float = float(np.radians(0.5))
     worse: float = 1.0
 

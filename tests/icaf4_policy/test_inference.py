@@ -17,7 +17,7 @@ from icaf4_policy.cloud import level_points
 from icaf4_policy.drawing import read_rgb
 from icaf4_policy.evaluation import evaluate_grasps, evaluate_sample
 from icaf4_policy.inference import MIN_PART_POINTS, Perception
-from icaf4_policy.joint_consistency import consistent_fits
+from icaf4_policy.joint_consistency import ConsistencyConfig, consistent_fits
 from icaf4_policy.proposals import ProposalConfig
 from icaf4_policy.tabletop import fit_table, segment_object
 from icaf4_policy.targets import true_part_boxes
@@ -224,6 +224,10 @@ def test_faces_of_parts_turn_their_boxes(perception, sample, features):
             np.degrees(np.arccos(box.T_camera_box[:3, 2] @ T[:3, 2]))
             for box, T in zip(boxes, true, strict=True)
         ]
+    told = knowing.predict(*seen, rng=rng()).part_boxes
+    deaf = dataclasses.replace(knowing, consistency=ConsistencyConfig(faces=False))
+    for box, turned in zip(deaf.predict(*seen, rng=rng()).part_boxes, told, strict=True):
+        assert np.degrees(np.arccos(box.T_camera_box[:3, 2] @ turned.T_camera_box[:3, 2])) > 3.0
     assert min(off["not looked at"]) > 4.0
     assert max(off["tops"]) < 1.0
 
