@@ -4,7 +4,8 @@ Every column is a mean average precision over recall. A detection belongs to the
 category whose mask it overlaps by half or more, the surest first; its parts, its affordance and its
 grasps are then entries of the columns, and hits where they are right. What belongs to no object is
 an entry that misses. Entries are ranked by the detection's score times how sure the network itself
-is of what it says. Run ``python -m benchmarks.perception table3 --help``.
+is of what it says. Of a box that is the same from behind, the front is the side that is seen, as in
+``icaf4_policy.naming``. Run ``python -m benchmarks.perception table3 --help``.
 """
 
 from __future__ import annotations
@@ -145,9 +146,10 @@ def _perception(weights: Path | None) -> ScenePerception:
 def score_scene(task: SceneTask) -> SceneScore:
     """Makes a scene, looks at it, and compares."""
     from icaf4_policy.detector.evaluation import LOWEST_SCORE, outlines, true_detections
+    from icaf4_policy.naming import picture_named_from_view
 
     config = GenerationConfig(seed=task.seed)
-    picture = make_scenes(task.ids, task.number, 1, config)[0]
+    picture = picture_named_from_view(make_scenes(task.ids, task.number, 1, config)[0])
     rng = np.random.default_rng([task.seed, task.number])
     perception = _perception(task.weights)
     began = time.perf_counter()

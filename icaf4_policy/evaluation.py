@@ -16,6 +16,7 @@ from artgym.datasets.sample import (
 )
 from icaf4_policy import metrics
 from icaf4_policy.inference import MIN_PART_POINTS, Perception
+from icaf4_policy.naming import named_from_view
 from icaf4_policy.pose_fitting import PoseFit
 from icaf4_policy.prediction import PointGrasps, Prediction
 from icaf4_policy.targets import true_object_boxes, true_part_boxes
@@ -33,6 +34,9 @@ def evaluate_sample(
 ) -> tuple[dict[str, float], Prediction]:
     """Every metric of one view, from the points of the sample's object.
 
+    Which side of an object is its front is taken from the view where both look the same, see
+    ``naming``.
+
     Args:
         perception: the network.
         sample: a labelled view.
@@ -46,6 +50,7 @@ def evaluate_sample(
         graspable (``grasp/network/...``), and over all its calls, where one at a point that offers
         nothing misses (``grasp_calls/network/...``), each beside its chance rows.
     """
+    sample = named_from_view(sample)
     seen = (sample.points_camera, sample.colors, sample.R_level_camera)
     prediction = perception.predict(*seen, rng=rng)
     if refit is not None:

@@ -26,6 +26,7 @@ from artgym.geometry.transforms import invert, transform_from, translation
 from icaf4_policy.anchors import AnchorFrame, Anchors
 from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs
+from icaf4_policy.naming import named_from_view
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,7 +146,7 @@ def targets_from_sample(
     max_points: int,
     features: Features = DEFAULT_FEATURES,
 ) -> Targets:
-    """Works out the targets of a sample.
+    """Works out the targets of a sample, named as ``naming.named_from_view`` has it.
 
     Args:
         sample: one view.
@@ -157,6 +158,7 @@ def targets_from_sample(
     Raises:
         InvalidArgumentError: the sample is of another category, or described otherwise.
     """
+    sample = named_from_view(sample)
     category = sample.object_id.partition("/")[0]
     if category not in categories:
         raise InvalidArgumentError(
