@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
 from icaf4_policy.cloud import surface_normals
 from icaf4_policy.pose_fitting import umeyama
 from icaf4_policy.targets import Targets
@@ -21,7 +22,7 @@ from icaf4_policy.targets import Targets
 Array = NDArray[np.floating]
 
 #: A face along an axis is looked for within this angle of where the axis is thought to be, radians.
-_REACH = float(np.radians(15.0))
+REACH = float(np.radians(15.0))
 #: Normals of one face are within this angle of each other, radians.
 _TIGHT = float(np.radians(4.0))
 #: A face has at least so many points, and this share of its part's.
@@ -30,6 +31,13 @@ _LEAST_POINTS, _LEAST_SHARE = 20, 0.1
 _SEEDS = 128
 #: How often the middle is worked out anew from the normals around it.
 _ITERATIONS = 3
+#: A wall stands within this angle of the vertical, radians.
+_UPRIGHT = float(np.radians(10.0))
+#: Of the normals of walls, at least this share is across the sides of one box, and of all normals
+#: at least this one.
+_SQUARE_SHARE, _WALL_SHARE = 0.6, 0.2
+#: Walls tell the axes of a box with errors of less than this, radians.
+_WALL_ERROR = float(np.radians(1.0))
 #: The error of a face that was seen in fewer training views than this is not known.
 _LEAST_VIEWS = 20
 #: More training views tell no more.
@@ -88,9 +96,47 @@ def face_directions(normals: ArrayLike, R_box: ArrayLike) -> tuple[Array, NDArra
     least = max(_LEAST_POINTS, int(np.ceil(_LEAST_SHARE * len(normals))))
     axes = np.ascontiguousarray(np.asarray(R_box, dtype=float).T)
     directions = np.stack(
-        [_face(normals, axis, np.cos(_REACH), np.cos(_TIGHT), least) for axis in axes]
+        [_face(normals, axis, np.cos(REACH), np.cos(_TIGHT), least) for axis in axes]
     )
     return directions, (directions != 0).any(axis=1)
+
+
+def has_walls(errors: tuple[float | None, float | None, float | None]) -> bool:
+    """Whether the sides of a part tell both horizontal axes of its box: its ``FaceErrors``."""
+    return all(error is not None and error < _WALL_ERROR for error in errors[:2])
+
+
+def square_rotations(normals: ArrayLike, up: ArrayLike) -> Array | None:
+    """How an upright box may be turned whose sides are the walls that are seen.
+
+    Args:
+        normals: (n, 3), unit, of the part's surface; on which side of it does not matter.
+        up: (3,), unit, the vertical in the frame of the normals.
+
+    Returns:
+        Its four rotations (4, 3, 3), the vertical as their third column, a quarter turn from one to
+        the next; ``None`` where few walls are seen, or they are not at right angles.
+    """
+    normals, up = np.asarray(normals, dtype=float), np.asarray(up, dtype=float)
+    level = frame_from_z(up)
+    across = normals @ level
+    walls = across[np.abs(across[:, 2]) < np.sin(_UPRIGHT)]
+    # Four times its angle is the same for all four sides of a box.
+    angles = 4.0 * np.arctan2(walls[:, 1], walls[:, 0])
+    chosen = angles[:: max(len(angles) // _SEEDS, 1)]
+    near = np.cos(chosen[:, None] - angles) > np.cos(4.0 * _TIGHT)
+    counts = near.sum(axis=1)
+    least = max(_LEAST_POINTS, _WALL_SHARE * len(normals), _SQUARE_SHARE * len(walls))
+    if not len(walls) or counts.max() < least:
+        return None
+    middle = near[counts.argmax()]
+    angle = np.angle(np.exp(1j * angles[middle]).sum()) / 4.0
+    return np.stack(
+        [
+            level @ matrix_from_axis_angle([0.0, 0.0, angle + quarter * np.pi / 2.0])
+            for quarter in range(4)
+        ]
+    )
 
 
 def face_errors(targets: Sequence[Targets], num_parts: int) -> FaceErrors:

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from artgym.datasets.sample import level_from_camera
 from artgym.errors import InvalidArgumentError, UnknownNameError
+from artgym.geometry.rotations import geodesic_angle
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
 from icaf4_policy.cloud import choose_points, level_points, surface_normals
 from icaf4_policy.collisions import hand_is_free
-from icaf4_policy.faces import face_directions
+from icaf4_policy.faces import REACH, face_directions, has_walls, square_rotations
 from icaf4_policy.features import (
     given_normals,
     has_normals,
@@ -26,7 +27,7 @@ from icaf4_policy.features import (
 from icaf4_policy.joint_consistency import AxisDirection, ConsistencyConfig, consistent_fits
 from icaf4_policy.joint_votes import joint_from_votes
 from icaf4_policy.model import Icaf4, Outputs
-from icaf4_policy.pose_fitting import PoseFit, fit_pose
+from icaf4_policy.pose_fitting import PoseFit, fit_pose, fit_turned
 from icaf4_policy.prediction import NO_JOINT, Grasps, JointEstimate, PointGrasps, Prediction
 from icaf4_policy.proposals import ProposalConfig, diverse
 from icaf4_policy.tabletop import MIN_OBJECT_POINTS, ObjectView, segment_object
@@ -381,12 +382,14 @@ class Perception:
         """One box a part, ``None`` where it was not found."""
         places = [np.flatnonzero(part == k) for k in range(len(joints))]
         nocs_of_parts, points_of_parts = [nocs[i] for i in places], [look.points[i] for i in places]
-        fits = tuple(
+        fits = [
             fit_pose(x, y, rng) if len(x) >= MIN_PART_POINTS else None
             for x, y in zip(nocs_of_parts, points_of_parts, strict=True)
-        )
+        ]
         if self.consistency is None:
-            return fits
+            return tuple(fits)
+        if fits[0] is not None and self.consistency.faces:
+            fits[0] = self._squared(look, fits[0], nocs_of_parts[0], places[0])
         return consistent_fits(
             fits,
             nocs_of_parts,
@@ -396,6 +399,24 @@ class Perception:
             self.consistency,
             directions=self._directions(look, fits, places, self.consistency),
         )
+
+    def _squared(self, look: _Look, fit: PoseFit, nocs: Array, place: NDArray[np.int64]) -> PoseFit:
+        """The fit of the base, or one along its walls where these are and it is far from them.
+
+        Seen from behind, a cabinet leaves a network in doubt which side is which, and its
+        coordinates lie in between; walls do not.
+        """
+        config = self.model.config
+        if look.normals is None or not config.upright:
+            return fit
+        if not has_walls(config.face_errors[self._index][0]):
+            return fit
+        rotations = square_rotations(look.normals[place], look.R_level_camera[2])
+        if rotations is None or geodesic_angle(rotations, fit.T_camera_box[:3, :3]).min() <= REACH:
+            return fit
+        squared = [fit_turned(nocs, look.points[place], R) for R in rotations]
+        best = max(squared, key=lambda each: each.inlier_share)
+        return best if best.inlier_share > 0.0 else fit
 
     def _directions(
         self,

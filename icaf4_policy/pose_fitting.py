@@ -275,3 +275,45 @@ def fit_pose(
         scale=float(scale),
         inlier_share=float(inliers.mean()),
     )
+
+
+def fit_turned(
+    nocs: ArrayLike,
+    points_camera: ArrayLike,
+    R_camera_box: ArrayLike,
+    *,
+    tolerance: float = TOLERANCE,
+) -> PoseFit:
+    """Fits the place and size of a box whose rotation is known.
+
+    Args:
+        nocs: (n, 3), 0.5 at the box's centre.
+        points_camera: (n, 3), metres.
+        R_camera_box: (3, 3).
+        tolerance: largest error of an inlier, in normalised units.
+
+    Returns:
+        The fit to the nearer points, found anew a few times; of no size where the coordinates run
+        against the points.
+    """
+    centered, points = np.asarray(nocs, dtype=float) - 0.5, np.asarray(points_camera, dtype=float)
+    R = np.asarray(R_camera_box, dtype=float)
+    turned = centered @ R.T
+    near = np.ones(len(points), dtype=bool)
+    errors = np.full(len(points), np.inf)
+    scale, center = 0.0, points.mean(axis=0)
+    for _ in range(_REFINEMENTS):
+        middle, center = turned[near].mean(axis=0), points[near].mean(axis=0)
+        arms = turned[near] - middle
+        scale = float(np.sum(arms * (points[near] - center)) / max(np.sum(arms**2), 1e-12))
+        if scale <= 0.0:
+            scale, errors = 0.0, np.full(len(points), np.inf)
+            break
+        center = center - scale * middle
+        errors = np.linalg.norm((points - center) @ R / scale - centered, axis=1)
+        near = errors <= max(tolerance, 1.5 * float(np.median(errors)))
+    return PoseFit(
+        T_camera_box=transform_from(R, center),
+        scale=scale,
+        inlier_share=float(np.mean(errors < tolerance)),
+    )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from artgym.geometry.rotations import matrix_from_axis_angle
+from artgym.geometry.rotations import geodesic_angle, matrix_from_axis_angle
 from icaf4_policy.anchors import AnchorConfig, anchors_from_config
-from icaf4_policy.faces import face_directions, face_errors
+from icaf4_policy.faces import face_directions, face_errors, has_walls, square_rotations
 from icaf4_policy.targets import targets_from_sample
 from tests.icaf4_policy.toy import toy_picture
 
@@ -68,6 +68,37 @@ def test_a_face_far_from_the_axis_is_none_of_its():
     face = normals_around(R_BOX[:, 0], 300, 0.01, rng)
     _, found = face_directions(face, turned(np.radians(30.0), 1))
     assert not found[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("sides", [[0], [0, 1]])
+def test_walls_tell_how_an_upright_box_is_turned_but_for_quarters(seed, sides):
+    rng = np.random.default_rng(seed)
+    up = R_BOX[:, 2]
+    walls = [normals_around(rng.choice([-1, 1]) * R_BOX[:, i], 150, 0.01, rng) for i in sides]
+    rest = [normals_around(up, 250, 0.01, rng), normals_around(np.zeros(3), 50, 1.0, rng)]
+    rotations = square_rotations(np.concatenate([*walls, *rest]), up)
+    assert np.degrees(geodesic_angle(rotations, R_BOX).min()) < 0.5
+    np.testing.assert_allclose(np.linalg.det(rotations), 1.0)
+    np.testing.assert_allclose(rotations[:, :, 2], np.tile(up, (4, 1)), atol=1e-12)
+    np.testing.assert_allclose(rotations[1:, :, 0], rotations[:-1, :, 1], atol=1e-12)
+
+
+def test_what_is_round_or_without_walls_is_turned_anyhow():
+    rng = np.random.default_rng(0)
+    up = R_BOX[:, 2]
+    column = rng.normal(size=(500, 3)) @ (np.eye(3) - np.outer(up, up))
+    column /= np.linalg.norm(column, axis=1, keepdims=True)
+    lid = normals_around(up, 500, 0.01, rng)
+    few = np.concatenate([lid, normals_around(R_BOX[:, 0], 80, 0.01, rng)])
+    for normals in (column, lid, few, np.zeros((0, 3))):
+        assert square_rotations(normals, up) is None
+
+
+def test_walls_need_both_horizontal_axes():
+    assert has_walls((0.001, 0.01, None))
+    assert not has_walls((None, 0.001, 0.001))
+    assert not has_walls((0.001, 0.03, 0.001))
 
 
 @pytest.fixture(scope="module")

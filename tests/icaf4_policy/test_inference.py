@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from artgym.datasets.sample import AFFORDANCE_UNKNOWN, JOINT_NONE
 from artgym.errors import InvalidArgumentError, NothingSeenError
-from artgym.geometry.rotations import grasp_angle, matrix_from_axis_angle
+from artgym.geometry.rotations import geodesic_angle, grasp_angle, matrix_from_axis_angle
 from icaf4_policy import cli
 from icaf4_policy.checkpoint import save_model
 from icaf4_policy.cloud import level_points
@@ -21,7 +21,7 @@ from icaf4_policy.joint_consistency import ConsistencyConfig, consistent_fits
 from icaf4_policy.proposals import ProposalConfig
 from icaf4_policy.tabletop import fit_table, segment_object
 from icaf4_policy.targets import true_part_boxes
-from tests.icaf4_policy.toy import toy_network, toy_picture
+from tests.icaf4_policy.toy import toy_network, toy_picture, toy_sample
 
 
 @pytest.fixture(scope="module")
@@ -230,6 +230,31 @@ def test_faces_of_parts_turn_their_boxes(perception, sample, features):
         assert np.degrees(np.arccos(box.T_camera_box[:3, 2] @ turned.T_camera_box[:3, 2])) > 3.0
     assert min(off["not looked at"]) > 4.0
     assert max(off["tops"]) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("errors", "is_squared"),
+    [((0.001, 0.001, 0.001), True), ((None, 0.001, 0.001), False), ((0.1, 0.001, 0.001), False)],
+)
+def test_a_base_lies_along_its_walls_where_coordinates_do_not(perception, errors, is_squared):
+    sample = toy_sample(0, 8000)
+    # Of what is seen of the base, half is walls.
+    height = np.abs(sample.npcs[:, 2] - 0.5)
+    keep = (sample.part == 1) | (height < 0.9 * height[sample.part == 0].max())
+    keep[::4] = True
+    per_point = ("points_camera", "colors", "part", "npcs", "naocs", "affordance", "grasp_row")
+    sample = dataclasses.replace(
+        sample, **{name: getattr(sample, name)[keep] for name in per_point}
+    )
+    third = matrix_from_axis_angle([0.0, 0.0, np.radians(30.0)])
+    model = with_coordinates(toy_network("none"), sample, third, noise=0.01)
+    model.config = dataclasses.replace(model.config, upright=True, face_errors=((errors,) * 2,))
+    knowing = dataclasses.replace(perception, model=model)
+    seen = (sample.points_camera, sample.colors, sample.R_level_camera)
+    base = knowing.predict(*seen, rng=rng()).part_boxes[0]
+    off = geodesic_angle(base.T_camera_box[:3, :3], true_part_boxes(sample)[0][:3, :3])
+    assert np.degrees(off) < 1.0 if is_squared else np.degrees(off) > 20.0
+    assert np.linalg.norm(base.T_camera_box[:3, 3] - true_part_boxes(sample)[0][:3, 3]) < 0.02
 
 
 def test_proposals_differ_from_one_another(perception, picture):

@@ -4,7 +4,7 @@ import pytest
 from artgym.errors import InvalidArgumentError
 from artgym.geometry.rotations import geodesic_angle, matrix_from_axis_angle
 from artgym.geometry.transforms import apply, transform_from
-from icaf4_policy.pose_fitting import _from_triangle, fit_pose, umeyama
+from icaf4_policy.pose_fitting import _from_triangle, fit_pose, fit_turned, umeyama
 
 R_CAMERA_BOX = matrix_from_axis_angle([0.3, 1.0, -2.0])
 T_BOX = np.array([0.1, -0.2, 0.9])
@@ -128,3 +128,22 @@ def test_values_that_are_not_finite_are_named():
     points[7, 1] = np.nan
     with pytest.raises(InvalidArgumentError, match=r"points_camera\[7\] is .*nan.*leave out"):
         fit_pose(nocs, points, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_a_known_rotation_leaves_place_and_size(share):
+    nocs, points = correspondences()
+    wrong = np.random.default_rng(1).random(len(nocs)) < share
+    points[wrong] += np.random.default_rng(2).normal(scale=0.5, size=(int(wrong.sum()), 3))
+    fit = fit_turned(nocs, points, R_CAMERA_BOX)
+    assert fit.scale == pytest.approx(SCALE, rel=0.02)
+    np.testing.assert_allclose(fit.T_camera_box[:3, 3], T_BOX, atol=0.005)
+    assert fit.inlier_share == pytest.approx(1.0 - share, abs=0.06)
+
+
+def test_a_rotation_that_coordinates_run_against_has_no_size():
+    nocs, points = correspondences()
+    half_turn = matrix_from_axis_angle([0.0, 0.0, np.pi])
+    fit = fit_turned(nocs, points, R_CAMERA_BOX @ half_turn)
+    assert (fit.scale, fit.inlier_share) == (0.0, 0.0)
+    assert np.isfinite(fit.T_camera_box).all()
