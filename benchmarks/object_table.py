@@ -86,6 +86,8 @@ class ObjectTableConfig:
         seed: of the views, the choice of points and the chance rows.
         workers: processes; the numbers do not depend on it.
         weights: folder with {category}.safetensors, instead of the shipped weights.
+        another_seed: folder with {category}.safetensors of some categories, trained by the same
+            command with another seed: what chance in training makes of the same.
         data: folder with {category}/train and val, made by `artgym generate artimage`, that the
             baselines are trained with; without one, only the network and chance are measured.
         work: folder for the baselines' networks; those that are there are not trained again.
@@ -102,6 +104,7 @@ class ObjectTableConfig:
     seed: int = 0
     workers: int = 2
     weights: Path | None = None
+    another_seed: Path | None = None
     data: Path | None = None
     work: Path | None = None
     baselines: tuple[str, ...] = SETS["artimage"]
@@ -128,8 +131,10 @@ class ObjectTableConfig:
         """The folder of each method's weights for a category; None for the shipped ones."""
         own = self.weights and self.weights.absolute()
         folders = {"icaf4": own, "no_faces": own}
+        if self.another_seed and (self.another_seed / f"{category}.safetensors").exists():
+            folders["another_seed"] = self.another_seed.absolute()
         if self.work and category in self.baselines:
-            folders |= {m: self.work.absolute() / m for m in METHOD_LABELS if m not in folders}
+            folders |= {m: self.work.absolute() / m for m in TABLE_1 if m not in folders}
         return folders
 
 

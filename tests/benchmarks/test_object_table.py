@@ -27,7 +27,7 @@ from tests.icaf4_policy.toy import toy_network, toy_sample
 
 
 def test_the_paper_has_a_row_for_every_method_and_category():
-    assert set(TABLE_1) == set(METHOD_LABELS) - {"no_faces"}
+    assert set(TABLE_1) == set(METHOD_LABELS) - {"no_faces", "another_seed"}
     for rows in TABLE_1.values():
         assert set(rows) == set(SETS["artimage"])
 
@@ -57,8 +57,15 @@ def test_baselines_need_data_and_a_place():
     with pytest.raises(InvalidArgumentError, match="data=data and work=None"):
         ObjectTableConfig(data=Path("data"))
     config = ObjectTableConfig(data=Path("data"), work=Path("work"))
-    assert set(config.weights_of("laptop")) == set(METHOD_LABELS)
+    assert set(config.weights_of("laptop")) == {*TABLE_1, "no_faces"}
     assert set(config.weights_of("box")) == {"icaf4", "no_faces"}
+
+
+def test_another_seed_has_a_line_where_there_is_one(tmp_path):
+    (tmp_path / "stapler.safetensors").touch()
+    config = ObjectTableConfig(another_seed=tmp_path)
+    assert config.weights_of("stapler")["another_seed"] == tmp_path
+    assert "another_seed" not in config.weights_of("cutter")
 
 
 def test_noisy_depth_is_another_result(tmp_path):
