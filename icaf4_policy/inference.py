@@ -440,7 +440,7 @@ class Perception:
                 continue
             cameras, found = face_directions(look.normals[places[k]], fit.T_camera_box[:3, :3])
             for axis, error in enumerate(errors[k]):
-                if found[axis] and error is not None:
+                if found[axis] and error is not None and error <= consistency.worst_face:
                     total = float(np.hypot(error, consistency.face_error))
                     directions.append(
                         AxisDirection(part=k, axis=axis, camera=cameras[axis], error=total)

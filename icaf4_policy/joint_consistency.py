@@ -47,6 +47,7 @@ class ConsistencyConfig:
             where the vertical is taken to be.
         faces: whether faces count.
         face_error: radians, the same of a face's direction beside what ``faces.FaceErrors`` has.
+        worst_face: radians; a face that told an axis worse than this in training does not count.
         worse: a part's fit may have its root-mean-square error grow by this share; a link that
             asks for more is left out. Points on a flat part hardly tell its depth from a turn, so
             that a fit that is better by half can still be the wrong one.
@@ -57,15 +58,16 @@ class ConsistencyConfig:
     tilt: float = float(np.radians(1.0))
     faces: bool = True
     face_error: float = float(np.radians(0.5))
+    worst_face: float = float(np.radians(4.5))
     worse: float = 1.0
 
     def __post_init__(self) -> None:
-        errors = (self.axis_error, self.tilt, self.face_error, self.worse)
+        errors = (self.axis_error, self.tilt, self.face_error, self.worst_face, self.worse)
         if not (self.independent > 0 and all(error >= 0 for error in errors)):
             raise InvalidArgumentError(
                 f"independent={self.independent}, axis_error={self.axis_error}, tilt={self.tilt}, "
-                f"face_error={self.face_error}, worse={self.worse}: expected the first above 0, "
-                "the others at least 0."
+                f"face_error={self.face_error}, worst_face={self.worst_face}, worse={self.worse}: "
+                "expected the first above 0, the others at least 0."
             )
 
 
