@@ -55,8 +55,8 @@ def _of_cloud(backbone: PointNet2, xyz0: Tensor, features: Tensor, first_of_equa
     whole = F.relu(backbone.whole_norm1(backbone.whole1(torch.cat([x2, xyz2], dim=-1))))
     whole = F.relu(backbone.whole_norm2(backbone.whole2(whole))).amax(dim=0, keepdim=True)
     x2 = F.relu(backbone.broadcast_norm(backbone.own(x2) + backbone.broadcast(whole)))
-    x1 = _propagated(backbone.propagation2, x2, x1, xyz2, xyz1)
-    return _propagated(backbone.propagation1, x1, x0, xyz1, xyz0)
+    x1 = _propagated(backbone.propagation2, x2, x1, xyz2, xyz1, first_of_equals)
+    return _propagated(backbone.propagation1, x1, x0, xyz1, xyz0, first_of_equals)
 
 
 def _farthest_points(points: Tensor, count: int) -> Tensor:
@@ -76,12 +76,17 @@ def _ball_query(
 ) -> Tensor:
     """Indices (m, count) of the nearest points within ``radius``; the nearest fills up."""
     squares = (centers[:, None] - points[None]).square().sum(dim=-1)  # (m, n)
-    count = min(count, len(points))
-    if first_of_equals:
-        distance, found = (each[:, :count] for each in squares.sort(dim=-1, stable=True))
-    else:
-        distance, found = squares.topk(count, dim=-1, largest=False)
+    distance, found = _nearest(squares, min(count, len(points)), first_of_equals)
     return torch.where(distance <= radius**2, found, found[:, :1])
+
+
+def _nearest(squares: Tensor, count: int, first_of_equals: bool) -> tuple[Tensor, Tensor]:
+    """The least ``count`` of each row (m, n) and their places, (m, count) each."""
+    if first_of_equals:
+        values, found = squares.sort(dim=-1, stable=True)
+        return values[:, :count], found[:, :count]
+    values, found = squares.topk(count, dim=-1, largest=False)
+    return values, found
 
 
 def _abstracted(
@@ -100,10 +105,11 @@ def _propagated(
     features: Tensor,
     centers: Tensor,
     points: Tensor,
+    first_of_equals: bool,
 ) -> Tensor:
     """Interpolation from the three nearest centers, then the layers on every point."""
     squares = (points[:, None] - centers[None]).square().sum(dim=-1)
-    distance, nearest = squares.topk(3, dim=-1, largest=False)
+    distance, nearest = _nearest(squares, 3, first_of_equals)
     weights = 1.0 / (distance + 1e-8)
     weights = weights / weights.sum(dim=-1, keepdim=True)
     carried = (center_features[nearest] * weights[..., None]).sum(dim=1)
