@@ -18,7 +18,7 @@ from torch import Tensor
 FloatArray = NDArray[np.float32]
 
 #: Gathered rows that are projected at once; their block stays in the processor's cache.
-_BLOCK_ROWS = 4096
+_BLOCK_ROWS = 1024
 
 
 @numba.njit(cache=True, fastmath=True)
