@@ -105,13 +105,18 @@ def faces_camera(sample: Sample) -> bool:
     return bool(front_camera @ center_camera <= 0.0)
 
 
+def _exchanged_parts(sample: Sample) -> NDArray[np.int64] | None:
+    """The number (K,) that each part has from the view; ``None`` where it is the one it has."""
+    return None if faces_camera(sample) else half_turn_parts(sample)
+
+
 def named_from_view(sample: Sample) -> Sample:
     """The sample; of an object that is the same after half a turn, its front towards the camera.
 
     The canonical axes are then turned, and parts have each other's numbers; the frames of the
     object and of its parts stay, and so do grasps.
     """
-    parts = None if faces_camera(sample) else half_turn_parts(sample)
+    parts = _exchanged_parts(sample)
     if parts is None:
         return sample
     return replace(
@@ -147,13 +152,11 @@ def _half_turned_coordinates(coordinates: NDArray[np.float32]) -> NDArray[np.flo
 
 def picture_named_from_view(picture: Picture) -> Picture:
     """The picture with all of its samples, and the numbers in its mask, so named."""
-    part_mask, samples = picture.part_mask.copy(), []
+    part_mask = picture.part_mask.copy()
     for index, sample in enumerate(picture.samples):
-        named = named_from_view(sample)
-        samples.append(named)
-        if named is not sample:
-            parts = half_turn_parts(sample)
-            assert parts is not None
+        parts = _exchanged_parts(sample)
+        if parts is not None:
             mine = (picture.instance_mask == index + 1) & (picture.part_mask > 0)
             part_mask[mine] = parts[picture.part_mask[mine] - 1] + 1
-    return replace(picture, part_mask=part_mask, samples=tuple(samples))
+    samples = tuple(named_from_view(sample) for sample in picture.samples)
+    return replace(picture, part_mask=part_mask, samples=samples)
