@@ -104,8 +104,8 @@ def fpfh(points: ArrayLike, viewpoint: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[n
         raise InvalidArgumentError(
             f"points has shape {points.shape}: expected (M, 3) with M at least 1."
         )
-    # The first of the nearest is the point itself.
-    near = Surroundings.of(points, _FEATURE_POINTS, _NEIGHBORS + 1, _RADIUS)
+    # One of the nearest is the point itself.
+    near = Surroundings.of(points, _FEATURE_POINTS, _NEIGHBORS + 1, _RADIUS).nearest_first()
     support, index, distance = near.support, near.index, near.distance
     close = slice(0, _NORMAL_POINTS)
     normals = plane_normals(support, index[:, close], near.found[:, close], viewpoint)

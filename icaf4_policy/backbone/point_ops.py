@@ -15,13 +15,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from artgym.errors import InvalidArgumentError
-
-#: Distances as plain float32 arithmetic gives them, without fused products: where two points are
-#: all but equally far, their order is then the one that torch finds, on any processor.
-_EXACT = {"nnan", "ninf", "nsz"}
+from icaf4_policy.nearest import EXACT, FAR, nearest_within
 
 
-@numba.njit(cache=True, fastmath=_EXACT)
+@numba.njit(cache=True, fastmath=EXACT)
 def farthest_points(points: NDArray[np.float32], count: int) -> NDArray[np.int64]:
     """Indices (count,) of a farthest-point sample of ``points`` (n, 3).
 
@@ -60,167 +57,44 @@ def farthest_points(points: NDArray[np.float32], count: int) -> NDArray[np.int64
     return chosen
 
 
-#: Cells of a grid along an axis at most; their width in terms of what holds the points asked for,
-#: and points more than those, so that few are asked for in cells that are not too small.
-_MOST_CELLS, _CELL_SHARE, _CELL_POINTS = 32, 0.3, 8
-#: Farther than anything, and finite when squared.
-_FAR = np.float32(1e18)
-
-
-@numba.njit(cache=True, fastmath=_EXACT)
-def _grid(  # type: ignore[no-untyped-def]
-    points, count
-):
-    """The points in cells, of which those about a place hold ``count`` of them or somewhat more.
-
-    Returns:
-        The lowest corner (3,); a cell's width; the cells along each axis (3,); where each cell
-        begins in the order of the cells, z fastest, (cells + 1,); and that order of points (n,).
-    """
-    n = points.shape[0]
-    low, extent = np.empty(3, np.float32), np.empty(3, np.float32)
-    for axis in range(3):
-        least, most = points[0, axis], points[0, axis]
-        for i in range(n):
-            least, most = min(least, points[i, axis]), max(most, points[i, axis])
-        low[axis], extent[axis] = least, most - least
-    # As if the points lay on three sides of their box.
-    area = extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0]
-    width = np.float32(_CELL_SHARE * np.sqrt(area * (count + _CELL_POINTS) / n))
-    width = max(width, max(extent) / np.float32(_MOST_CELLS), np.float32(1e-12))
-    cells = np.empty(3, np.int64)
-    for axis in range(3):
-        cells[axis] = min(_MOST_CELLS, int(extent[axis] / width) + 1)
-    cell = np.empty(n, np.int64)
-    starts = np.zeros(cells[0] * cells[1] * cells[2] + 1, np.int64)
-    for i in range(n):
-        c = 0
-        for axis in range(3):
-            c = c * cells[axis] + _cell_of(points[i, axis], low[axis], width, cells[axis])
-        cell[i] = c
-        starts[c + 1] += 1
-    for c in range(len(starts) - 1):
-        starts[c + 1] += starts[c]
-    free, order = starts.copy(), np.empty(n, np.int64)
-    for i in range(n):
-        order[free[cell[i]]] = i
-        free[cell[i]] += 1
-    return low, width, cells, starts, order
-
-
-@numba.njit(cache=True, fastmath=_EXACT)
-def _cell_of(place, low, width, cells):  # type: ignore[no-untyped-def]
-    """The cell along an axis that a coordinate lies in, or the last one on its side."""
-    return min(max(int(np.floor((place - low) / width)), 0), cells - 1)
-
-
-@numba.njit(cache=True, fastmath=_EXACT)
-def _nearest(  # type: ignore[no-untyped-def]
-    points, centers, radius, count
-):
-    """The ``count`` points nearest to each center, no farther than ``radius``, nearest first.
-
-    Of equally far ones the first comes first. Cells are searched from the center's own outwards,
-    until what is left is too far.
-
-    Returns:
-        Indices (m, count), squared distances (m, count), and how many were found (m,).
-    """
-    low, width, cells, starts, order = _grid(points, count)
-    xs, ys, zs = points[order, 0], points[order, 1], points[order, 2]
-    # Where a cell ends is known up to rounding.
-    slack = np.float32(1e-5) * width * max(cells)
-    m = centers.shape[0]
-    found = np.zeros((m, count), np.int64)
-    squares = np.empty((m, count), np.float32)
-    numbers = np.empty(m, np.int64)
-    own, first, last = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
-    for j in range(m):
-        x, y, z = centers[j, 0], centers[j, 1], centers[j, 2]
-        best, chosen = squares[j], found[j]
-        limit = np.float32(radius * radius)
-        held = 0
-        for axis in range(3):
-            own[axis] = _cell_of(centers[j, axis], low[axis], width, cells[axis])
-        for ring in range(max(cells)):
-            # What is not in cells up to this ring is farther than the nearest of its outer faces.
-            gap = _FAR
-            for axis in range(3):
-                first[axis] = max(own[axis] - ring, 0)
-                last[axis] = min(own[axis] + ring, cells[axis] - 1)
-                place = centers[j, axis] - low[axis]
-                if first[axis] > 0:
-                    gap = min(gap, place - first[axis] * width)
-                if last[axis] < cells[axis] - 1:
-                    gap = min(gap, (last[axis] + 1) * width - place)
-            for cx in range(first[0], last[0] + 1):
-                for cy in range(first[1], last[1] + 1):
-                    row = (cx * cells[1] + cy) * cells[2]
-                    inner = abs(cx - own[0]) < ring and abs(cy - own[1]) < ring
-                    # Of a row inside the ring its two ends, else all of it.
-                    for end in range(2 if inner else 1):
-                        start, stop = starts[row + first[2]], starts[row + last[2] + 1]
-                        if inner:
-                            cz = own[2] + (ring if end else -ring)
-                            if not 0 <= cz < cells[2]:
-                                continue
-                            start, stop = starts[row + cz], starts[row + cz + 1]
-                        for i in range(start, stop):
-                            d = (xs[i] - x) ** 2 + (ys[i] - y) ** 2 + (zs[i] - z) ** 2
-                            index = order[i]
-                            if d > limit or (
-                                d == limit and held == count and index > chosen[count - 1]
-                            ):
-                                continue
-                            # Insertion into the short sorted list of the nearest so far.
-                            slot = held if held < count else count - 1
-                            while slot > 0 and (
-                                best[slot - 1] > d
-                                or (best[slot - 1] == d and chosen[slot - 1] > index)
-                            ):
-                                best[slot], chosen[slot] = best[slot - 1], chosen[slot - 1]
-                                slot -= 1
-                            best[slot], chosen[slot] = d, index
-                            held = min(held + 1, count)
-                            if held == count:
-                                limit = min(limit, best[count - 1])
-            gap -= slack
-            if gap > 0 and gap * gap > limit:
-                break
-        numbers[j] = held
-    return found, squares, numbers
-
-
-@numba.njit(cache=True, fastmath=_EXACT)
+@numba.njit(cache=True, fastmath=EXACT)
 def ball_query(
     points: NDArray[np.float32], centers: NDArray[np.float32], radius: float, count: int
 ) -> NDArray[np.int64]:
     """Indices (m, count) of the points (n, 3) nearest to each center (m, 3) within ``radius``.
 
-    Nearest first; where fewer lie in the ball, the nearest repeats. A ball without any point
-    gives the nearest point of all.
+    The nearest comes first, the others in no order; where fewer lie in the ball, the nearest
+    repeats. A ball without any point gives the nearest point of all.
     """
-    found, _, numbers = _nearest(points, centers, radius, count)
+    found, squares, numbers = nearest_within(points, centers, radius, count)
     for j in range(len(centers)):
         if numbers[j] == 0:
             found[j, 0] = np.argmin(((points - centers[j]) ** 2).sum(axis=1))
+        first = np.argmin(squares[j])
+        found[j, 0], found[j, first] = found[j, first], found[j, 0]
         for slot in range(max(numbers[j], 1), count):
             found[j, slot] = found[j, 0]
     return found
 
 
-@numba.njit(cache=True, fastmath=_EXACT)
+@numba.njit(cache=True, fastmath=EXACT)
 def three_nearest(
     points: NDArray[np.float32], centers: NDArray[np.float32]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """The three centers (m, 3), m >= 3, nearest to each point (n, 3), and their weights.
 
     Returns:
-        Indices (n, 3) and inverse-squared-distance weights (n, 3) that sum to one.
+        Indices (n, 3), nearest first, and inverse-squared-distance weights (n, 3) that sum to one.
     """
-    found, squares, _ = _nearest(centers, points, _FAR, 3)
+    found, squares, _ = nearest_within(centers, points, FAR, 3)
     weights = np.empty((len(points), 3), np.float32)
     for i in range(len(points)):
+        for a, b in ((0, 1), (1, 2), (0, 1)):
+            if squares[i, b] < squares[i, a] or (
+                squares[i, b] == squares[i, a] and found[i, b] < found[i, a]
+            ):
+                squares[i, a], squares[i, b] = squares[i, b], squares[i, a]
+                found[i, a], found[i, b] = found[i, b], found[i, a]
         w0 = 1.0 / (squares[i, 0] + 1e-8)
         w1 = 1.0 / (squares[i, 1] + 1e-8)
         w2 = 1.0 / (squares[i, 2] + 1e-8)
