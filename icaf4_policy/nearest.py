@@ -1,8 +1,8 @@
 """The points of a cloud that are nearest to others, compiled.
 
-Points are sorted into a grid of cells; around a place those of the nearest cells are looked at, and
-of their distances the largest that still counts is found by halving, which takes a few passes of
-plain comparisons: far less than keeping the nearest in order.
+Points are sorted into a grid of cells. Those of the cells about a place are laid side by side,
+once for all who ask from there, and of their distances the largest that still counts is found by
+halving: a few passes over whole vectors, which take far less than keeping the nearest in order.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ FAR = 1e18
 
 #: Cells of a grid along an axis at most; their width in terms of what holds the points asked for.
 _MOST_CELLS, _CELL_SHARE = 32, 0.4
-#: Loops over distances run over whole vectors of so many.
-_LANES = 32
+#: Loops over distances run over whole vectors of so many; what fills the last is beyond ``FAR``.
+_LANES, _FILLER = 32, np.float32(1e19)
 #: The limit is first guessed, as if squared distances were evenly spread, then halved.
 _GUESSES = 6
 
@@ -49,6 +49,20 @@ def _grid(  # type: ignore[no-untyped-def]
     cells = np.empty(3, np.int64)
     for axis in range(3):
         cells[axis] = min(_MOST_CELLS, int(extent[axis] / width) + 1)
+    starts, order, _ = _sorted_into(points, low, width, cells)
+    return low, width, cells, starts, order
+
+
+@numba.njit(cache=True, fastmath=EXACT)
+def _cell_of(place, low, width, cells):  # type: ignore[no-untyped-def]
+    """The cell along an axis that a coordinate lies in, or the last one on its side."""
+    return min(max(int(np.floor((place - low) / width)), 0), cells - 1)
+
+
+@numba.njit(cache=True, fastmath=EXACT)
+def _sorted_into(points, low, width, cells):  # type: ignore[no-untyped-def]
+    """Where each cell begins in the order of the cells (cells + 1,), that order, and the cells."""
+    n = len(points)
     cell = np.empty(n, np.int64)
     starts = np.zeros(cells[0] * cells[1] * cells[2] + 1, np.int64)
     for i in range(n):
@@ -63,13 +77,7 @@ def _grid(  # type: ignore[no-untyped-def]
     for i in range(n):
         order[free[cell[i]]] = i
         free[cell[i]] += 1
-    return low, width, cells, starts, order
-
-
-@numba.njit(cache=True, fastmath=EXACT)
-def _cell_of(place, low, width, cells):  # type: ignore[no-untyped-def]
-    """The cell along an axis that a coordinate lies in, or the last one on its side."""
-    return min(max(int(np.floor((place - low) / width)), 0), cells - 1)
+    return starts, order, cell
 
 
 @numba.njit(cache=True)
@@ -79,6 +87,63 @@ def _count_up_to(bits, total, limit):  # type: ignore[no-untyped-def]
     for i in range(total):
         count += np.int32(bits[i] <= limit)
     return count
+
+
+@numba.njit(cache=True)
+def _halved(bits, total, high, inside, count, value):  # type: ignore[no-untyped-def]
+    """The limit up to which there are ``count``, or the least up to which there are more.
+
+    Args:
+        bits: the numbers, read as whole ones; those in ``total`` count.
+        total: of them.
+        high: a limit up to which there are more than ``count``: ``inside``.
+        inside: see there.
+        count: how many are asked for.
+        value: (1,), float32, to read a whole number as what it stands for.
+
+    Returns:
+        The limit, and how many there are up to it.
+    """
+    value_bits = value.view(np.int32)
+    value_bits[0] = high
+    # Up to ``low`` there are ``below``, fewer than asked for.
+    low, below, low_value, high_value = np.int32(-1), np.int32(0), np.float32(0.0), value[0]
+    tries = 0
+    while inside != count and high - low > 1:
+        if tries < _GUESSES:
+            share = np.float32(count + 0.5 - below) / np.float32(inside - below)
+            value[0] = low_value + (high_value - low_value) * share
+            middle = np.int32(min(max(value_bits[0], low + 1), high - 1))
+        else:
+            middle = np.int32(low + (high - low) // 2)
+        tries += 1
+        value_bits[0] = middle
+        here = _count_up_to(bits, total, middle)
+        if here >= count:
+            high, inside, high_value = middle, here, value[0]
+        else:
+            low, below, low_value = middle, here, value[0]
+    return high, inside
+
+
+@numba.njit(cache=True)
+def _first_chosen(bits, total, high, place, order, count, chosen):  # type: ignore[no-untyped-def]
+    """Chooses all below ``high``, and of those at it as many as there is room for, in order."""
+    held = 0
+    for i in range(total):
+        if bits[i] < high:
+            chosen[held] = i
+            held += 1
+    before = -1
+    while held < count:
+        index, at = len(order), 0
+        for i in range(total):
+            if bits[i] == high and before < order[place[i]] < index:
+                index, at = order[place[i]], i
+        before = index
+        chosen[held] = at
+        held += 1
+    return held
 
 
 @numba.njit(cache=True)
@@ -107,95 +172,66 @@ def nearest_within(
     found = np.zeros((m, count), np.int64)
     squares = np.full((m, count), np.float32(np.inf))
     numbers = np.empty(m, np.int64)
-    own, first, last = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
-    # Squared distances of the points looked at, also as whole numbers, which are in the same order.
+    # The points looked at, and their places in the order of the cells.
+    block = np.empty((3, n + _LANES), np.float32)
+    bx, by, bz = block
+    place = np.empty(n, np.int64)
+    first, last = np.empty(3, np.int64), np.empty(3, np.int64)
+    total, padded, block_cell, block_ring = 0, 0, -1, 0
+    # Their squared distances, also as whole numbers, which are in the same order.
     apart = np.empty(n + _LANES, np.float32)
     bits = apart.view(np.int32)
-    place = np.empty(n, np.int64)  # theirs in the order of the cells
-    chosen = np.empty(count + 1, np.int64)
     value = np.empty(1, np.float32)
-    value_bits = value.view(np.int32)
+    chosen = np.empty(count + 1, np.int64)
     farthest = np.float32(radius)
     reach = farthest * farthest
-    for j in range(m):
+    _, sequence, own = _sorted_into(centers, low, width, cells)
+    for j in sequence:
         x, y, z = centers[j, 0], centers[j, 1], centers[j, 2]
-        for axis in range(3):
-            own[axis] = _cell_of(centers[j, axis], low[axis], width, cells[axis])
         ring = 0
         while True:
             ring += 1
+            if own[j] != block_cell or ring != block_ring:
+                block_cell, block_ring, rest = own[j], ring, own[j]
+                for axis in (2, 1, 0):
+                    rest, along = divmod(rest, cells[axis])
+                    first[axis] = max(along - ring, 0)
+                    last[axis] = min(along + ring, cells[axis] - 1)
+                total = 0
+                for cx in range(first[0], last[0] + 1):
+                    for cy in range(first[1], last[1] + 1):
+                        row = (cx * cells[1] + cy) * cells[2]
+                        for s in range(starts[row + first[2]], starts[row + last[2] + 1]):
+                            bx[total], by[total], bz[total], place[total] = xs[s], ys[s], zs[s], s
+                            total += 1
+                padded = (total + _LANES - 1) // _LANES * _LANES
+                block[:, total:padded] = _FILLER
             # What is not in cells up to this ring is farther than the nearest of its outer faces.
             gap = np.float32(FAR)
             for axis in range(3):
-                first[axis] = max(own[axis] - ring, 0)
-                last[axis] = min(own[axis] + ring, cells[axis] - 1)
                 offset = centers[j, axis] - low[axis]
                 if first[axis] > 0:
                     gap = min(gap, offset - first[axis] * width)
                 if last[axis] < cells[axis] - 1:
                     gap = min(gap, (last[axis] + 1) * width - offset)
-            total = 0
-            for cx in range(first[0], last[0] + 1):
-                for cy in range(first[1], last[1] + 1):
-                    row = (cx * cells[1] + cy) * cells[2]
-                    start, stop = starts[row + first[2]], starts[row + last[2] + 1]
-                    for i in range(stop - start):
-                        s = start + i
-                        d = (xs[s] - x) ** 2 + (ys[s] - y) ** 2 + (zs[s] - z) ** 2
-                        apart[total + i] = d
-                    for i in range(stop - start):
-                        place[total + i] = start + i
-                    total += stop - start
-            padded = (total + _LANES - 1) // _LANES * _LANES
-            for i in range(total, padded):
-                apart[i] = np.float32(np.inf)
+            for i in range(padded):
+                apart[i] = (bx[i] - x) ** 2 + (by[i] - y) ** 2 + (bz[i] - z) ** 2
             gap = max(gap - slack, np.float32(0.0))
             is_whole = gap >= farthest
             value[0] = reach if is_whole else gap * gap
-            high = value_bits[0]
+            high = value.view(np.int32)[0]
             inside = _count_up_to(bits, padded, high)
             if is_whole or inside >= count:
                 break
-        # Up to ``high`` there are ``inside`` points; up to ``low_bits`` fewer, ``below``.
-        low_bits, below = np.int32(-1), np.int32(0)
-        low_value, high_value = np.float32(0.0), value[0]
-        tries = 0
-        while inside > count and high - low_bits > 1:
-            if tries < _GUESSES:
-                share = np.float32(count + 0.5 - below) / np.float32(inside - below)
-                value[0] = low_value + (high_value - low_value) * share
-                middle = min(max(value_bits[0], low_bits + 1), high - 1)
-            else:
-                middle = low_bits + (high - low_bits) // 2
-            tries += 1
-            middle = np.int32(middle)
-            value_bits[0] = middle
-            here = _count_up_to(bits, padded, middle)
-            if here >= count:
-                high, inside, high_value = middle, here, value[0]
-            else:
-                low_bits, below, low_value = middle, here, value[0]
+        if inside > count:
+            high, inside = _halved(bits, padded, high, inside, count, value)
         held = 0
         if inside <= count:
             for i in range(total):
                 chosen[held] = i
                 held += bits[i] <= high
         else:
-            for i in range(total):
-                if bits[i] < high:
-                    chosen[held] = i
-                    held += 1
-            # More are equally far than there is room for.
-            before = -1
-            while held < count:
-                next_one, at = n, 0
-                for i in range(total):
-                    index = order[place[i]]
-                    if bits[i] == high and before < index < next_one:
-                        next_one, at = index, i
-                before = next_one
-                chosen[held] = at
-                held += 1
+            held = _first_chosen(bits, total, high, place, order, count, chosen)
         for slot in range(held):
             found[j, slot] = order[place[chosen[slot]]]
             squares[j, slot] = apart[chosen[slot]]
