@@ -194,8 +194,8 @@ class Perception:
             rng: for the fits and the choice of points.
 
         Raises:
-            InvalidArgumentError: too few points, features of another network, or a part that the
-                network does not know.
+            InvalidArgumentError: too few points, one that is not finite, features of another
+                network, or a part that the network does not know.
         """
         num_parts = self.model.config.num_parts
         if part is not None and not 1 <= part < num_parts:
@@ -247,10 +247,17 @@ class Perception:
     ) -> _Look:
         """Shows a cloud to the network, and asks for grasps at so many points (on a part)."""
         points_camera, colors = np.asarray(points_camera, dtype=float), np.asarray(colors)
-        if points_camera.ndim != 2 or len(points_camera) < MIN_OBJECT_POINTS:
+        if points_camera.shape[1:] != (3,) or len(points_camera) < MIN_OBJECT_POINTS:
             raise InvalidArgumentError(
                 f"points_camera has shape {points_camera.shape}: expected (M, 3) with M at least "
                 f"{MIN_OBJECT_POINTS}."
+            )
+        is_finite = np.isfinite(points_camera).all(axis=1)
+        if not is_finite.all():
+            row = int(np.argmin(is_finite))
+            raise InvalidArgumentError(
+                f"points_camera[{row}] is {points_camera[row].tolist()}: leave out points without "
+                f"a depth, {np.count_nonzero(~is_finite)} here."
             )
         config = self.model.config
         points_level, center_level = level_points(points_camera, R_level_camera)

@@ -325,6 +325,15 @@ def test_few_points_are_refused(perception, sample):
         )
 
 
+def test_points_that_are_nowhere_are_refused(perception, sample):
+    points = sample.points_camera.copy()
+    points[7, 2], points[9] = np.nan, np.inf
+    with pytest.raises(InvalidArgumentError, match=r"points_camera\[7\] .* nan\].*, 2 here"):
+        perception.predict(points, sample.colors, sample.R_level_camera, rng=rng())
+    with pytest.raises(InvalidArgumentError, match=r"shape \(\d+, 2\)"):
+        perception.predict(points[:, :2], sample.colors, sample.R_level_camera, rng=rng())
+
+
 def test_a_small_cloud_is_filled_up(perception, sample):
     prediction = perception.predict(
         sample.points_camera[:200], sample.colors[:200], sample.R_level_camera, rng=rng()
