@@ -10,6 +10,7 @@ from icaf4_policy.backbone.point_ops import (
     three_nearest,
 )
 from icaf4_policy.backbone.set_abstraction import _plain_group_max, group_max
+from tests.icaf4_policy.test_nearest import float32_squares, odd_clouds
 
 
 @pytest.fixture
@@ -64,29 +65,10 @@ def test_three_nearest_against_sorting(cloud):
     np.testing.assert_allclose(weights[::7, 0], 1.0, atol=1e-4)
 
 
-def odd_clouds():
-    """Clouds that a grid of cells could get wrong."""
-    rng = np.random.default_rng(1)
-    around = rng.normal(size=(400, 3))
-    return {
-        "around": around,
-        "plane": around * [1.0, 1.0, 0.0],
-        "line": around * [0.0, 1.0, 0.0] + 5.0,
-        "point": around * 0.0 - 2.0,
-        "lattice": rng.integers(0, 12, (400, 3)) / 12.0,
-        "stray": np.vstack([around, [[300.0, -200.0, 100.0]]]),
-        "two heaps": np.vstack([0.01 * around, 0.01 * around + 40.0]),
-        "few": around[:5],
-    }
-
-
 @pytest.mark.parametrize("name", odd_clouds())
 def test_neighbors_in_any_cloud_are_those_of_plain_arithmetic(name):
-    cloud = odd_clouds()[name].astype(np.float32)
-    beside = np.random.default_rng(2).normal(scale=3.0, size=(40, 3)).astype(np.float32)
-    centers = np.vstack([cloud[::9], beside])
-    offset = cloud[None] - centers[:, None]
-    squares = offset[..., 0] ** 2 + offset[..., 1] ** 2 + offset[..., 2] ** 2  # float32
+    cloud, centers = odd_clouds()[name]
+    squares = float32_squares(centers, cloud)
     order = np.argsort(squares, axis=1, kind="stable")
     for radius, count in ((0.3, 4), (0.7, 32), (1000.0, 3)):
         found = ball_query(cloud, centers, radius, count)
