@@ -1,9 +1,11 @@
 """Which is the front of an object that looks the same from behind.
 
 A carton whose flaps are alike is the same after half a turn about the vertical, but for the names:
-no picture tells its first flap from the second. Both descriptions are true, and a network that is
-told now this one, now that one learns what lies between. Told is therefore always the one whose
-front is towards the camera, and it is what predictions are compared with.
+no picture tells its first flap from the second, nor whether the sides the flaps hang on are its
+front and back or its left and right. All these descriptions are true, and a network that is told
+now this one, now that one learns what lies between. Told is therefore always the same one, and it
+is what predictions are compared with: the first flap and its twin are at the back and the front,
+and the front is towards the camera.
 """
 
 from __future__ import annotations
@@ -17,8 +19,9 @@ from artgym.datasets.sample import JOINT_REVOLUTE, Picture, Sample
 
 Array = NDArray[np.floating]
 
-#: Half a turn about the z axis.
-_HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+#: A quarter of a turn about the z axis, and half of one.
+_QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_HALF_TURN = _QUARTER_TURN @ _QUARTER_TURN
 #: Parts are alike whose boxes and axes differ by less than this share of the object's size.
 _ALIKE = 0.01
 
@@ -97,38 +100,84 @@ class _Layout:
         return bool(self.types[k] == other.types[j] and max(apart) < _ALIKE * self.size)
 
 
-def faces_camera(sample: Sample) -> bool:
-    """Whether the front of the base's canonical box, its x side, is towards the camera."""
-    front_camera = sample.T_camera_parts[0, :3, :3] @ sample.R_object_canonical[:, 0]
-    center = sample.R_object_canonical @ sample.part_centers[0]
-    center_camera = sample.T_camera_parts[0, :3, :3] @ center + sample.T_camera_parts[0, :3, 3]
-    return bool(front_camera @ center_camera <= 0.0)
+def faces_camera(sample: Sample, turn: Array | None = None) -> bool:
+    """Whether the front of the base's canonical box, its x side, is towards the camera.
+
+    Args:
+        sample: the object as it is seen.
+        turn: ``R_canonical_turned`` (3, 3), where the question is of axes turned so.
+    """
+    R_object_canonical = sample.R_object_canonical.astype(float)
+    front = (R_object_canonical if turn is None else R_object_canonical @ turn)[:, 0]
+    T_camera_base = sample.T_camera_parts[0].astype(float)
+    center = R_object_canonical @ sample.part_centers[0]
+    center_camera = T_camera_base[:3, :3] @ center + T_camera_base[:3, 3]
+    return bool(T_camera_base[:3, :3] @ front @ center_camera <= 0.0)
 
 
-def _exchanged_parts(sample: Sample) -> NDArray[np.int64] | None:
-    """The number (K,) that each part has from the view; ``None`` where it is the one it has."""
-    return None if faces_camera(sample) else half_turn_parts(sample)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Naming:
+    """What the view makes of a sample's names.
+
+    Attributes:
+        turn: ``R_canonical_named`` (3, 3), quarter turns about the z axis.
+        parts: (K,), the number that each part gets; applied twice, it changes nothing.
+    """
+
+    turn: Array
+    parts: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, sample: Sample) -> _Naming | None:
+        """That of a sample; ``None`` where names stay as they are."""
+        twins = half_turn_parts(sample)
+        if twins is None:
+            return None
+        centers = _Layout.of(sample).centers
+        pairs = [(k, twin) for k, twin in enumerate(twins) if k < twin]
+        across = any(_is_across(centers[k] - centers[twin]) for k, twin in pairs[:1])
+        turn = _QUARTER_TURN if across else np.eye(3)
+        if not faces_camera(sample, turn):
+            turn = turn @ _HALF_TURN
+        parts = np.arange(sample.num_parts)
+        for k, twin in pairs:
+            x, y, _ = apart = (centers[k] - centers[twin]) @ turn
+            if -y > 0.0 if _is_across(apart) else x > 0.0:
+                parts[[k, twin]] = twin, k
+        if np.array_equal(turn, np.eye(3)) and np.array_equal(parts, np.arange(len(parts))):
+            return None
+        return cls(turn=turn, parts=parts)
+
+    def coordinates(self, coordinates: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Normalised coordinates (n, 3) along the named axes."""
+        return ((coordinates - np.float32(0.5)) @ self.turn + 0.5).astype(np.float32)
+
+
+def _is_across(apart: Array) -> bool:
+    """Whether what lies so far apart (3,) does so along y rather than x."""
+    return bool(abs(apart[1]) > abs(apart[0]))
 
 
 def named_from_view(sample: Sample) -> Sample:
-    """The sample; of an object that is the same after half a turn, its front towards the camera.
+    """The sample; of an object that is the same after half a turn, named as the module has it.
 
-    The canonical axes are then turned, and parts have each other's numbers; the frames of the
-    object and of its parts stay, and so do grasps.
+    The canonical axes are then turned, and of two parts that are alike the one at the back has the
+    lower number, of two at the sides the one at the left; the frames of the object and of its
+    parts stay, and so do grasps.
     """
-    parts = _exchanged_parts(sample)
-    if parts is None:
+    naming = _Naming.of(sample)
+    if naming is None:
         return sample
+    parts, turn = naming.parts, naming.turn
     return replace(
         sample,
-        # A half turn is its own inverse.
         part=parts[sample.part].astype(sample.part.dtype),
-        npcs=_half_turned_coordinates(sample.npcs),
-        naocs=_half_turned_coordinates(sample.naocs),
+        npcs=naming.coordinates(sample.npcs),
+        naocs=naming.coordinates(sample.naocs),
         grasp_part=parts[sample.grasp_part].astype(sample.grasp_part.dtype),
-        R_object_canonical=(sample.R_object_canonical @ _HALF_TURN).astype(np.float32),
-        part_centers=(sample.part_centers[parts] @ _HALF_TURN).astype(np.float32),
-        object_center=(sample.object_center @ _HALF_TURN).astype(np.float32),
+        R_object_canonical=(sample.R_object_canonical @ turn).astype(np.float32),
+        part_centers=(sample.part_centers[parts] @ turn).astype(np.float32),
+        object_center=(sample.object_center @ turn).astype(np.float32),
         **{name: getattr(sample, name)[parts] for name in _BY_PART},
     )
 
@@ -145,18 +194,13 @@ _BY_PART = (
 )
 
 
-def _half_turned_coordinates(coordinates: NDArray[np.float32]) -> NDArray[np.float32]:
-    x, y, z = coordinates.T
-    return np.stack([1.0 - x, 1.0 - y, z], axis=-1)
-
-
 def picture_named_from_view(picture: Picture) -> Picture:
     """The picture with all of its samples, and the numbers in its mask, so named."""
     part_mask = picture.part_mask.copy()
     for index, sample in enumerate(picture.samples):
-        parts = _exchanged_parts(sample)
-        if parts is not None:
+        naming = _Naming.of(sample)
+        if naming is not None:
             mine = (picture.instance_mask == index + 1) & (picture.part_mask > 0)
-            part_mask[mine] = parts[picture.part_mask[mine] - 1] + 1
+            part_mask[mine] = naming.parts[picture.part_mask[mine] - 1] + 1
     samples = tuple(named_from_view(sample) for sample in picture.samples)
     return replace(picture, part_mask=part_mask, samples=samples)
