@@ -20,8 +20,9 @@ test: lint  ## lint and every test but the slow ones
 test-slow: setup  ## the tests marked slow
 	@$(PYTHON_HERE) -m pytest -m slow
 
-bench: setup  ## success rate of the policies; writes benchmarks/results
+bench: setup  ## success rate of the policies; writes benchmarks/results and the pages that quote it
 	@$(PYTHON_HERE) -m benchmarks.success_rate
+	@$(PYTHON_HERE) -m benchmarks.report
 
 lint: setup  ## ruff and codespell
 	@$(PYTHON_HERE) -m ruff check .
