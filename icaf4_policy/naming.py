@@ -141,8 +141,9 @@ class _Naming:
             turn = turn @ _HALF_TURN
         parts = np.arange(sample.num_parts)
         for k, twin in pairs:
-            x, y, _ = apart = (centers[k] - centers[twin]) @ turn
-            if -y > 0.0 if _is_across(apart) else x > 0.0:
+            apart = (centers[k] - centers[twin]) @ turn
+            is_first = apart[1] > 0.0 if _is_across(apart) else apart[0] < 0.0
+            if not is_first:
                 parts[[k, twin]] = twin, k
         if np.array_equal(turn, np.eye(3)) and np.array_equal(parts, np.arange(len(parts))):
             return None
