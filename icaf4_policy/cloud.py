@@ -1,4 +1,4 @@
-"""How an object's points are put before the network: level, centred, a fixed number."""
+"""How points are put before the network: level, centred, a fixed number, with normals."""
 
 from __future__ import annotations
 
