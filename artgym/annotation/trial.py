@@ -5,12 +5,15 @@ attempt succeeds if the part moves through half its range held between the finge
 (``tasks.success``: ``success_gripped``), provided that the open hand took the grasp's pose without
 being pushed away and without pushing any part.
 
-An attempt stops as soon as its outcome is known; ``REFERENCE`` does not, solves contacts more
-exactly and looks more often: the slow judge of what is done here fast.
+An attempt waits for nothing that rests and stops as soon as its outcome is known; ``REFERENCE``
+does neither, steps more finely and solves contacts more exactly: the slow judge of what is done
+here fast.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +24,7 @@ from artgym.geometry import transforms
 from artgym.geometry.hand import T_hand_grasp
 from artgym.objects.model import ArticulatedObject
 from artgym.sim.contact import PartContact
-from artgym.sim.conversion import poses_from_transforms
+from artgym.sim.conversion import pose_from_transform, poses_from_transforms
 from artgym.sim.scene import ManipulationScene, PhysicsConfig
 from artgym.tasks.success import TRAVEL_THRESHOLD, Progress
 
@@ -31,7 +34,7 @@ _T_GRASP_HAND = transforms.invert(T_hand_grasp)
 
 
 #: The cheapest settings that keep the outcomes of ``REFERENCE`` (``benchmarks.speed labels``).
-_FAST = PhysicsConfig(timestep=1.0 / 480.0, contact_offset=0.003)
+_FAST = PhysicsConfig(timestep=1.0 / 240.0, contact_offset=0.003)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,12 +42,14 @@ class TrialConfig:
     """How an attempt is carried out.
 
     Attributes:
-        physics: time step, iterations, gains.
-        approach_timestep: seconds of a step while the hand comes, where it should touch nothing.
+        physics: time step of the approach and of the carrying, iterations, gains.
+        close_timestep: seconds of a step while the jaws close, where contacts are hardest.
         standoff: where the hand starts, metres before the grasp along the approach.
         speed: of the hand, m/s, in the approach and along the joint.
         close_time: seconds given to the jaws.
         settle_time: seconds of rest after the approach and after the motion.
+        rest: the open hand and the jaws are not waited for any longer once they are slower than
+            this, m/s; at 0 they are given all their time.
         overshoot: share of the range the hand goes beyond half of it, against the lag of its
             spring.
         miss: how far from the grasp pose the open hand may come to rest, metres.
@@ -55,20 +60,21 @@ class TrialConfig:
     """
 
     physics: PhysicsConfig = _FAST
-    approach_timestep: float = 1.0 / 240.0
+    close_timestep: float = 1.0 / 480.0
     standoff: float = 0.06
     speed: float = 0.4
     close_time: float = 0.2
     settle_time: float = 0.1
+    rest: float = 0.01
     overshoot: float = 0.1
     miss: float = 0.003
     nudge: float = 0.01
-    look_time: float = 1.0 / 60.0
+    look_time: float = 1.0 / 120.0
     early_stop: bool = True
     slip_time: float = 0.1
 
     def __post_init__(self) -> None:
-        for step in (self.approach_timestep, self.physics.timestep):
+        for step in (self.physics.timestep, self.close_timestep):
             steps = self.look_time / step if step > 0 else 0.0
             if steps < 0.5 or abs(steps - round(steps)) > 1e-6 * steps:
                 raise InvalidArgumentError(
@@ -78,11 +84,10 @@ class TrialConfig:
 
 
 #: The judge of the fast settings: fine steps all the way, three times the iterations, contacts
-#: known from far, twice the looks, no early stop.
+#: known from far, all rests waited out, no early stop.
 REFERENCE = TrialConfig(
     physics=PhysicsConfig(timestep=1.0 / 480.0, position_iterations=50),
-    approach_timestep=1.0 / 480.0,
-    look_time=1.0 / 120.0,
+    rest=0.0,
     early_stop=False,
 )
 
@@ -145,7 +150,7 @@ def try_grasp(
     )
     attempt = _Attempt(scene, obj, part, q, config)
     try:
-        end = attempt.run(approach, _carry_path(obj, q, part, T_object_hand, config))
+        end = attempt.run(approach, lambda: _carry_path(obj, q, part, T_object_hand, config))
     finally:
         scene.close()
     return Trial(
@@ -169,26 +174,32 @@ class _Attempt:
         assert scene.hand is not None
         self._scene, self._hand = scene, scene.hand
         self._part, self._config = part, config
-        joints = obj.joints
-        self._closed = np.array([joint.closed for joint in joints])
-        self._range = np.array([joint.range for joint in joints])
-        self._start = self._fractions(q)
-        self.progress = Progress.begin(float(self._start[part - 1]))
+        self._closed_and_range = [(joint.closed, joint.range) for joint in obj.joints]
+        #: Open fraction of each part, at the start and now.
+        self._start = self._now = self._fractions(map(float, q))
+        self.progress = Progress.begin(self._start[part - 1])
         #: Simulator steps between two looks.
         self._stride = 1
         #: Looks since the part was last touched.
         self._untouched = 0
 
-    def run(self, approach: Array, carry: Array) -> str:
-        """The hand's poses (n, 4, 4) before and after the jaws close; one of ``TRIAL_ENDS``."""
+    def run(self, approach: Array, carry: Callable[[], Array]) -> str:
+        """One of ``TRIAL_ENDS``.
+
+        Args:
+            approach: the hand's poses (n, 4, 4) before the jaws close.
+            carry: gives those after.
+        """
         config = self._config
-        self._set_timestep(config.approach_timestep)
+        self._set_timestep(config.physics.timestep)
         blocked = self._approach_is_blocked(approach)
         if blocked and config.early_stop:
             return "blocked"
-        self._set_timestep(config.physics.timestep)
-        self._hand.close_jaws()
-        end = self._close_and_carry(carry)
+        self._set_timestep(config.close_timestep)
+        end = self._close()
+        if end is None:
+            self._set_timestep(config.physics.timestep)
+            end = self._carry(carry())
         return "blocked" if blocked else end
 
     def _approach_is_blocked(self, approach: Array) -> bool:
@@ -196,9 +207,11 @@ class _Attempt:
         config = self._config
         self._advance(1)
         blocked = self._misses(approach[0])
-        for target in poses_from_transforms(approach[1:]):
+        target = pose_from_transform(approach[0])
+        for position in approach[1:, :3, 3]:
             if blocked and config.early_stop:
                 return True
+            target.p = position
             self._hand.pull_to(target)
             self._advance(self._stride)
             blocked |= self._has_pushed()
@@ -207,26 +220,35 @@ class _Attempt:
                 return True
             self._advance(self._stride)
             blocked |= self._has_pushed()
+            if math.hypot(*self._hand.linear_velocity()) < config.rest:
+                break
         return blocked or self._misses(approach[-1])
 
-    def _close_and_carry(self, carry: Array) -> str:
-        """Closes the jaws and takes the hand along the carrying poses (n, 4, 4)."""
+    def _close(self) -> str | None:
+        """Closes the jaws; how the attempt ends if it does so here."""
         config = self._config
-        early, patience = config.early_stop, self._looks(config.slip_time)
+        self._hand.close_jaws()
+        width = self._hand.width()
         for _ in range(self._looks(config.close_time)):
             self._advance(self._stride, look=True)
-            if early and self.progress.gripped_is_lost:
+            if config.early_stop and self.progress.gripped_is_lost:
                 return "lost"
-        if early and self._untouched >= patience:
-            return "empty"
+            before, width = width, self._hand.width()
+            if abs(width - before) < config.rest * config.look_time:
+                break
+        return "empty" if config.early_stop and self._is_out_of_touch() else None
+
+    def _carry(self, path: Array) -> str:
+        """Takes the hand along the poses (n, 4, 4)."""
+        config = self._config
         resting = [None] * self._looks(config.settle_time)
-        for target in (*poses_from_transforms(carry), *resting):
+        for target in (*poses_from_transforms(path), *resting):
             if target is not None:
                 self._hand.pull_to(target)
             self._advance(self._stride, look=True)
             if self.progress.travel >= TRAVEL_THRESHOLD:
                 return "moved"
-            if early and (self._untouched >= patience or self.progress.gripped_is_lost):
+            if config.early_stop and (self._is_out_of_touch() or self.progress.gripped_is_lost):
                 return "lost"
         return "not moved"
 
@@ -237,26 +259,34 @@ class _Attempt:
     def _looks(self, seconds: float) -> int:
         return max(1, round(seconds / self._config.look_time))
 
-    def _fractions(self, q: Array) -> Array:
-        return (q - self._closed) / self._range
+    def _fractions(self, q: Iterable[float]) -> list[float]:
+        return [
+            (position - closed) / reach
+            for position, (closed, reach) in zip(q, self._closed_and_range, strict=True)
+        ]
 
     def _advance(self, steps: int, *, look: bool = False) -> None:
         """Steps, and adds the part's motion; an open hand's contacts are not looked at."""
         self._scene.step(steps)
         contact = self._scene.contact(self._part) if look else PartContact(False, False)
-        self._now = self._fractions(self._scene.body.positions())
+        self._now = self._fractions(self._scene.body.positions().tolist())
         self.progress = self.progress.advance(
-            float(self._now[self._part - 1]), contact.touched, contact.pinched
+            self._now[self._part - 1], contact.touched, contact.pinched
         )
         self._untouched = 0 if contact.touched else self._untouched + 1
+
+    def _is_out_of_touch(self) -> bool:
+        return self._untouched >= self._looks(self._config.slip_time)
 
     def _misses(self, T_world_hand: Array) -> bool:
         offset = self._hand.pose()[:3, 3] - T_world_hand[:3, 3]
         return bool(np.linalg.norm(offset) > self._config.miss)
 
     def _has_pushed(self) -> bool:
-        pushed = float(np.abs(self._now - self._start).max())
-        return max(pushed, self.progress.path) > self._config.nudge
+        nudge = self._config.nudge
+        return self.progress.path > nudge or any(
+            abs(now - start) > nudge for now, start in zip(self._now, self._start, strict=True)
+        )
 
 
 def _approach_path(T_object_hand: Array, config: TrialConfig) -> Array:

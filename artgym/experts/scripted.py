@@ -27,7 +27,7 @@ _HOLD = np.array([0, 0, 0, 0, 0, 0, -1], dtype=np.float32)
 _T_GRASP_HAND = transforms.invert(T_hand_grasp)
 
 #: An arm lags behind its targets: it is tried more slowly, and given more time to come to rest.
-_ARM_TRIAL = TrialConfig(speed=0.15, settle_time=0.3)
+_ARM_TRIAL = TrialConfig(speed=0.15, settle_time=0.3, rest=0.0)
 #: Share of the range through which an arm must be able to carry a part.
 _ARM_CARRIES = 0.65
 #: Where the straight approach begins, metres before the grasp.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from artgym.geometry import transforms
 from artgym.geometry.grasps import candidate_rotations
 from artgym.geometry.rotations import JAW_SYMMETRY
 from artgym.objects import catalog
+from artgym.sim.scene import ManipulationScene
 from tests.sim.poses import CLOSING_UP, bar_bounds, drawer_with_lying_bar, grasp_from_tcp
 
 
@@ -77,6 +80,31 @@ def test_inside_the_body_the_hand_is_blocked(drawer):
     assert verdict(drawer, drawer.rest_positions, T_object_grasp) == Verdict.COLLISION
 
 
+def test_what_rests_is_not_waited_for(drawer):
+    q = [drawer.joints[0].position(0.02)]
+    steps = []
+    for rest in (0.0, TrialConfig().rest):
+        config = TrialConfig(rest=rest)
+        with counted_steps() as counted:
+            assert try_grasp(drawer, q, 1, handle_grasp(drawer, q), config).success
+        steps.append(counted[0])
+    assert steps[1] < 0.8 * steps[0]
+
+
+@contextlib.contextmanager
+def counted_steps():
+    """Counts the simulator's steps."""
+    counted, step = [0], ManipulationScene.step
+
+    def count(scene, steps=1):
+        counted[0] += steps
+        step(scene, steps)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ManipulationScene, "step", count)
+        yield counted
+
+
 def test_below_the_table_the_hand_is_blocked(drawer):
     T_object_grasp = grasp_from_tcp(CLOSING_UP, np.array([0.6, 0.0, 0.0]))
     assert try_grasp(drawer, drawer.rest_positions, 1, T_object_grasp).end == "blocked"
@@ -124,4 +152,4 @@ def test_looks_come_after_whole_steps():
         with pytest.raises(InvalidArgumentError, match=f"look_time={seconds}"):
             TrialConfig(look_time=seconds)
     with pytest.raises(InvalidArgumentError, match=r"steps of 0\.0 s"):
-        TrialConfig(approach_timestep=0.0)
+        TrialConfig(close_timestep=0.0)
