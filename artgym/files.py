@@ -33,7 +33,8 @@ from artgym.errors import (
     InvalidArgumentError,
 )
 
-#: Raised by one with each change of the layout that an older reader cannot read.
+#: Of manifests and files of arrays: raised by one with each change of the layout that an older
+#: reader cannot read. Other formats count their own.
 SCHEMA_VERSION = 1
 
 ARRAYS_FORMAT = "artgym-arrays"
@@ -203,7 +204,9 @@ def read_arrays(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], 
         return dict(sorted(arrays.items())), json.loads(get_text(file, "attributes"))
 
 
-def hdf5_image(file_format: str, fill: Callable[[h5py.File], None]) -> bytes:
+def hdf5_image(
+    file_format: str, fill: Callable[[h5py.File], None], version: int = SCHEMA_VERSION
+) -> bytes:
     """The bytes of an HDF5 file that ``fill`` fills.
 
     Built in memory, because HDF5 answers a full disk with files that it can no longer close. The
@@ -221,7 +224,7 @@ def hdf5_image(file_format: str, fill: Callable[[h5py.File], None]) -> bytes:
         track_times=False,
     ) as file:
         put_text(file, "format", file_format)
-        file.attrs["schema_version"] = np.int32(SCHEMA_VERSION)
+        file.attrs["schema_version"] = np.int32(version)
         fill(file)
         file.flush()
         return file.id.get_file_image()
@@ -265,7 +268,9 @@ def get_text(item: h5py.Group, name: str) -> str:
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File]:
+def opened(
+    path: str | os.PathLike[str], file_format: str, version: int = SCHEMA_VERSION
+) -> Iterator[h5py.File]:
     """One of our HDF5 files; whatever goes wrong inside becomes one error that names it."""
     try:
         # Files never change once they have their name, so that they need no lock; and some network
@@ -273,9 +278,9 @@ def opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File
         with h5py.File(path, "r", locking=False) as file:
             if get_text(file, "format") != file_format:
                 raise DamagedFileError(f"its format is not {file_format!r}")
-            version = int(cast(np.integer, file.attrs["schema_version"]))
-            if version != SCHEMA_VERSION:
-                raise InvalidArgumentError(_version_message(path, version))
+            found = int(cast(np.integer, file.attrs["schema_version"]))
+            if found != version:
+                raise InvalidArgumentError(_version_message(path, found, version))
             yield file
     except InvalidArgumentError:
         raise
@@ -285,9 +290,9 @@ def opened(path: str | os.PathLike[str], file_format: str) -> Iterator[h5py.File
         raise DamagedFileError(f"{path} is damaged: {error}. {DAMAGE_REMEDY}") from error
 
 
-def _version_message(path: str | os.PathLike[str], version: object) -> str:
+def _version_message(path: str | os.PathLike[str], found: object, version: int) -> str:
     return (
-        f"{path} has schema version {version}, this artgym reads {SCHEMA_VERSION}. Make the data "
+        f"{path} has schema version {found}, this artgym reads {version}. Make the data "
         "again with this version, or install the version that made it."
     )
 
@@ -453,7 +458,7 @@ class Manifest:
                 f"{path} is damaged: {type(error).__name__}: {error}. Restore it from a copy, or "
                 "delete the folder and make it again."
             ) from error
-        raise InvalidArgumentError(_version_message(path, version))
+        raise InvalidArgumentError(_version_message(path, version, SCHEMA_VERSION))
 
     def require_config(self, folder: str | os.PathLike[str], config: Mapping[str, Any]) -> None:
         """Raises InvalidArgumentError unless ``folder``, which holds this, fits ``config``."""

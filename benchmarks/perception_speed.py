@@ -96,10 +96,11 @@ def _network_input(
 
     model = perception.model
     hook = model.backbone.register_forward_pre_hook(catch)
-    points_level, center_level = level_points(sample.points_camera, sample.R_level_camera)
+    points_level, _ = level_points(sample.points_camera, sample.R_level_camera)
     pick = choose_points(len(points_level), model.config.num_points, rng)
     features = model.config.features
-    given = point_inputs(points_level, sample.colors, center_level, features, pick)
+    normals_level = sample.normals_camera[pick] @ sample.R_level_camera.T.astype(float)
+    given = point_inputs(sample.colors[pick], normals_level, features)
     with torch.inference_mode():
         model(
             torch.from_numpy(points_level[pick][None].astype(np.float32)),

@@ -14,9 +14,10 @@ from artgym.datasets.sample import (
     level_from_camera,
 )
 from artgym.errors import DamagedFileError
+from artgym.geometry.normals import surface_normals
 from icaf4_policy.anchors import Anchors
 from icaf4_policy.cloud import level_points
-from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs
+from icaf4_policy.features import DEFAULT_FEATURES, Features, has_normals, point_inputs
 from icaf4_policy.pose_fitting import umeyama
 from icaf4_policy.targets import Targets
 
@@ -66,11 +67,14 @@ def targets_from_authors(
     graspable = np.flatnonzero(affordance == AFFORDANCE_YES)
     matched, residual = anchors.match(R_grasps[graspable])
     axis_level, pivot_level = _joints(sample, points_level)
-    gray = np.full((total, 3), _GRAY, dtype=np.uint8)
+    gray = np.full((len(keep), 3), _GRAY, dtype=np.uint8)
+    normals_level = (
+        surface_normals(points_level, keep, -center_level) if has_normals(features) else None
+    )
     return Targets(
         category=0,
         points_level=points_level[keep].astype(np.float32),
-        colors=point_inputs(points_level, gray, center_level, features, keep),
+        colors=point_inputs(gray, normals_level, features),
         part=sample.part[keep],
         npcs=sample.npcs[keep].astype(np.float16),
         naocs=sample.naocs[keep].astype(np.float16),

@@ -14,8 +14,8 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from artgym.geometry.normals import surface_normals
 from artgym.geometry.rotations import frame_from_z, matrix_from_axis_angle
-from icaf4_policy.cloud import surface_normals
 from icaf4_policy.pose_fitting import umeyama
 from icaf4_policy.targets import Targets
 

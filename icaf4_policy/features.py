@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from artgym.datasets.sample import Picture, Sample
 from artgym.errors import InvalidArgumentError
 from icaf4_policy.backbone.classical import DESCRIPTOR_CHANNELS, daisy, fpfh
-from icaf4_policy.cloud import surface_normals
 
 Array = NDArray[np.floating]
 
@@ -47,41 +46,40 @@ def given_channels(features: Features) -> int:
     return CHANNELS[features] if features in DESCRIPTOR_CHANNELS else 3
 
 
-def point_inputs(
-    points_level: Array,
-    colors: NDArray[np.uint8],
-    center_level: Array,
-    features: Features,
-    at: NDArray[np.integer],
-) -> NDArray[np.uint8]:
-    """What the network is given of some points of one object.
-
-    Args:
-        points_level: (M, 3), level frame, centred.
-        colors: uint8 (M, 3), or descriptors (M, C) where these are the features.
-        center_level: (3,), what was taken off the points, so that the camera is at its negative.
-        features: which.
-        at: (n,), the points.
-
-    Returns:
-        uint8 (n, C), C of ``CHANNELS``; a normal's coordinates from -1 to 1 in 254 steps.
+def require_colors(colors: NDArray[np.uint8], count: int, features: Features) -> None:
+    """Whether ``colors`` are what a network is given beside so many points.
 
     Raises:
-        InvalidArgumentError: ``colors`` has another shape.
+        InvalidArgumentError: they have another shape.
     """
-    expected = (len(points_level), given_channels(features))
+    expected = (count, given_channels(features))
     if colors.shape != expected:
         raise InvalidArgumentError(
             f"colors has shape {colors.shape}: expected {expected}, "
             f"{'descriptors' if features in DESCRIPTOR_CHANNELS else 'the colours'} of features "
             f"{features!r}."
         )
+
+
+def point_inputs(
+    colors: NDArray[np.uint8], normals_level: Array | None, features: Features
+) -> NDArray[np.uint8]:
+    """What the network is given of points of one object.
+
+    Args:
+        colors: uint8 (n, 3), or descriptors (n, C) where these are the features.
+        normals_level: (n, 3), unit, level frame; None where the features have no normals.
+        features: which.
+
+    Returns:
+        uint8 (n, C), C of ``CHANNELS``; a normal's coordinates from -1 to 1 in 254 steps.
+    """
     is_given = has_color(features) or features in DESCRIPTOR_CHANNELS
-    given = [colors[at]] if is_given else []
+    given = [colors] if is_given else []
     if has_normals(features):
-        normals = surface_normals(points_level, at, -center_level)
-        given.append(np.rint(127.0 * normals + 128.0).astype(np.uint8))
-    return np.concatenate(given, axis=1) if given else np.empty((len(at), 0), np.uint8)
+        assert normals_level is not None
+        given.append(np.rint(127.0 * normals_level + 128.0).astype(np.uint8))
+    return np.concatenate(given, axis=1) if given else np.empty((len(colors), 0), np.uint8)
 
 
 def given_normals(given: NDArray[np.uint8]) -> Array:

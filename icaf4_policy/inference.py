@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from artgym.datasets.sample import level_from_camera
 from artgym.errors import InvalidArgumentError, UnknownNameError
+from artgym.geometry.normals import surface_normals
 from artgym.geometry.rotations import geodesic_angle
 from icaf4_policy.anchors import anchors_from_config
 from icaf4_policy.checkpoint import load_model
-from icaf4_policy.cloud import choose_points, level_points, surface_normals
+from icaf4_policy.cloud import choose_points, level_points
 from icaf4_policy.collisions import hand_is_free
 from icaf4_policy.faces import REACH, face_directions, has_walls, square_rotations
 from icaf4_policy.features import (
@@ -23,6 +24,7 @@ from icaf4_policy.features import (
     has_normals,
     point_descriptors,
     point_inputs,
+    require_colors,
 )
 from icaf4_policy.joint_consistency import AxisDirection, ConsistencyConfig, consistent_fits
 from icaf4_policy.joint_votes import joint_from_votes
@@ -262,7 +264,13 @@ class Perception:
         config = self.model.config
         points_level, center_level = level_points(points_camera, R_level_camera)
         pick = choose_points(len(points_camera), config.num_points, rng)
-        given = point_inputs(points_level, colors, center_level, config.features, pick)
+        require_colors(colors, len(points_camera), config.features)
+        normals_level = (
+            surface_normals(points_level, pick, -center_level)
+            if has_normals(config.features)
+            else None
+        )
+        given = point_inputs(colors[pick], normals_level, config.features)
         outputs = self.model(
             torch.from_numpy(points_level[pick][None].astype(np.float32)),
             torch.from_numpy(given[None].astype(np.float32) / 255.0),

@@ -175,7 +175,9 @@ def targets_from_sample(
     return Targets(
         category=list(categories).index(category),
         points_level=points_level[keep].astype(np.float32),
-        colors=point_inputs(points_level, sample.colors, center_level, features, keep),
+        colors=point_inputs(
+            sample.colors[keep], sample.normals_camera[keep] @ R_level_camera.T, features
+        ),
         part=sample.part[keep],
         npcs=sample.npcs[keep].astype(np.float16),
         naocs=sample.naocs[keep].astype(np.float16),

@@ -27,7 +27,7 @@ from artgym.annotation.annotate import (
 )
 from artgym.annotation.filter import FilterConfig, Verdict, judge
 from artgym.datasets.depth_noise import sensed_depth
-from artgym.datasets.picture_files import write_pictures
+from artgym.datasets.picture_files import PICTURES_VERSION, write_pictures
 from artgym.datasets.sample import (
     AFFORDANCE_NO,
     AFFORDANCE_UNKNOWN,
@@ -45,6 +45,7 @@ from artgym.files import Manifest
 from artgym.geometry import transforms
 from artgym.geometry.camera import points_from_depth
 from artgym.geometry.grasps import NUM_APPROACHES, NUM_CANDIDATES, NUM_ROLLS
+from artgym.geometry.normals import surface_normals
 from artgym.jobs import ShardTask, run_shards
 from artgym.objects import catalog
 from artgym.objects.model import ArticulatedObject, canonical_box
@@ -440,13 +441,13 @@ def _sample(
     R_object_canonical = np.asarray(obj.R_object_canonical, dtype=float)
     points_canonical = points_part @ R_object_canonical
     types, axes, pivots, fractions = _joints(obj, T_camera_object, shown.placed.q)
+    points_camera = points_from_depth(sensed, camera.intrinsics).reshape(-1, 3)[kept]
     return Sample(
         object_id=obj.object_id,
         box=_box(part_mask),
         R_level_camera=level_from_camera(T_camera_world[:3, 2]).astype(np.float32),
-        points_camera=points_from_depth(sensed, camera.intrinsics)
-        .reshape(-1, 3)[kept]
-        .astype(np.float32),
+        points_camera=points_camera.astype(np.float32),
+        normals_camera=_normals(points_camera),
         colors=rgb.reshape(-1, 3)[kept],
         part=part.astype(np.uint8),
         npcs=((points_canonical - centers[part]) / scales[part, None] + 0.5).astype(np.float32),
@@ -471,6 +472,14 @@ def _sample(
         joint_pivot_camera=pivots.astype(np.float32),
         open_fraction=fractions.astype(np.float32),
     )
+
+
+def _normals(points_camera: Array) -> NDArray[np.float16]:
+    """Unit normals (n, 3) of the surface that points (n, 3) lie on, towards the camera."""
+    if not len(points_camera):
+        return np.empty((0, 3), np.float16)
+    at = np.arange(len(points_camera))
+    return surface_normals(points_camera, at, np.zeros(3)).astype(np.float16)
 
 
 def _on_the_surface(
@@ -590,7 +599,12 @@ def generate_artimage(
         _pictures_task,
         folder,
         write=write_pictures,
-        config={"generation": asdict(config), "category": category, "split": split},
+        config={
+            "generation": asdict(config),
+            "pictures_version": PICTURES_VERSION,
+            "category": category,
+            "split": split,
+        },
         workers=workers,
         backend=backend,
         progress=progress,
@@ -634,6 +648,7 @@ def generate_reartmix(
         write=write_pictures,
         config={
             "generation": asdict(config),
+            "pictures_version": PICTURES_VERSION,
             "categories": list(categories),
             "objects": ids,
             "split": split,

@@ -35,6 +35,8 @@ from artgym.files import (
 from artgym.geometry.grasps import NUM_CANDIDATES
 
 PICTURES_FORMAT = "artgym-pictures"
+#: Raised by one with each change that an older reader cannot read.
+PICTURES_VERSION = 2
 
 #: gzip level of a picture's arrays, which are many and written once each; those of its samples are
 #: smaller, and read again and again.
@@ -50,6 +52,7 @@ _SHAPES: dict[str, tuple[int | str, ...]] = {
     "box": (4,),
     "R_level_camera": (3, 3),
     "points_camera": ("M", 3),
+    "normals_camera": ("M", 3),
     "colors": ("M", 3),
     "part": ("M",),
     "npcs": ("M", 3),
@@ -127,7 +130,7 @@ def write_pictures(path: str | os.PathLike[str], pictures: Sequence[Picture]) ->
         rows = np.frombuffer(padded, np.uint8).reshape(len(ids), longest)
         put_array(file, _IDS, rows, level=_LEVEL)
 
-    write_file_whole(path, hdf5_image(PICTURES_FORMAT, fill))
+    write_file_whole(path, hdf5_image(PICTURES_FORMAT, fill, PICTURES_VERSION))
 
 
 def read_pictures(path: str | os.PathLike[str]) -> list[Picture]:
@@ -137,7 +140,7 @@ def read_pictures(path: str | os.PathLike[str]) -> list[Picture]:
         DamagedFileError: the file is missing, cut short or not what it should be.
         InvalidArgumentError: it was written with another schema version.
     """
-    with opened(path, PICTURES_FORMAT) as file:
+    with opened(path, PICTURES_FORMAT, PICTURES_VERSION) as file:
         return [_get_picture(file, i, int(n)) for i, n in enumerate(_object_counts(file))]
 
 
@@ -344,7 +347,7 @@ class _ShardFolder(LazySequence[T]):
 
     def _item(self, position: int) -> T:
         shard = bisect_right(self._starts, position) - 1
-        with opened(self._verified_path(shard), PICTURES_FORMAT) as file:
+        with opened(self._verified_path(shard), PICTURES_FORMAT, PICTURES_VERSION) as file:
             return self._get(file, position - self._starts[shard], shard)
 
     def _verified_path(self, shard: int) -> Path:
@@ -390,14 +393,14 @@ class SampleFolder(_ShardFolder[Sample]):
         self._found: dict[int, tuple[list[str], NDArray[np.int64]]] = {}
         for shard in range(len(self.manifest.shards)):
             path = self.folder / self.manifest.shards[shard].name
-            with opened(path, PICTURES_FORMAT) as file:
+            with opened(path, PICTURES_FORMAT, PICTURES_VERSION) as file:
                 self._firsts.append([0, *accumulate(_object_counts(file).tolist())])
         return [firsts[-1] for firsts in self._firsts]
 
     def _item(self, position: int) -> Sample:
         shard = bisect_right(self._starts, position) - 1
         if shard not in self._found:
-            with opened(self._verified_path(shard), PICTURES_FORMAT) as file:
+            with opened(self._verified_path(shard), PICTURES_FORMAT, PICTURES_VERSION) as file:
                 if not _is_hard_link(file, _PLACES):
                     # A shard of an earlier version, which does not say.
                     return self._get(file, position - self._starts[shard], shard)

@@ -33,6 +33,8 @@ class Sample:
         box: float32 (4,): left, top, width and height of what is seen of it, pixels, as in COCO.
         R_level_camera: float32 (3, 3), from the table's normal.
         points_camera: float32 (M, 3), metres; where the picture's depth is noisy, so are they.
+        normals_camera: float16 (M, 3), unit, towards the camera, of planes through the points
+            around each: ``geometry.normals.surface_normals``.
         colors: uint8 (M, 3).
         part: uint8 (M,), part index of each point.
         npcs: float32 (M, 3) in [0, 1]: the point normalised in its own part's canonical box.
@@ -66,6 +68,7 @@ class Sample:
     box: NDArray[np.float32]
     R_level_camera: NDArray[np.float32]
     points_camera: NDArray[np.float32]
+    normals_camera: NDArray[np.float16]
     colors: NDArray[np.uint8]
     part: NDArray[np.uint8]
     npcs: NDArray[np.float32]

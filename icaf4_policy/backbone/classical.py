@@ -17,7 +17,7 @@ from torch.nn import functional as F
 
 from artgym.errors import InvalidArgumentError, MissingDependencyError
 from artgym.geometry.camera import project
-from icaf4_policy.cloud import Surroundings, plane_normals
+from artgym.geometry.normals import Surroundings, plane_normals
 
 Array = NDArray[np.floating]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from artgym.errors import InvalidArgumentError
-from icaf4_policy.nearest import EXACT, FAR, nearest_within
+from artgym.geometry.nearest import EXACT, FAR, nearest_within
 
 
 @numba.njit(cache=True, fastmath=EXACT)

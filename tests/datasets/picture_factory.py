@@ -52,6 +52,7 @@ def random_sample(
         box=floats(4),
         R_level_camera=floats(3, 3),
         points_camera=floats(num_points, 3),
+        normals_camera=floats(num_points, 3).astype(np.float16),
         colors=integers(0, 256, (num_points, 3), np.uint8),
         part=integers(0, num_parts, points, np.uint8),
         npcs=floats(num_points, 3),

@@ -15,7 +15,6 @@ import h5py
 import numpy as np
 import pytest
 
-from artgym import files
 from artgym.datasets import picture_files
 from artgym.datasets.picture_files import (
     PictureFolder,
@@ -195,10 +194,10 @@ class TestPictures:
             read_pictures(tmp_path / "arrays.h5")
 
     def test_other_version(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(files, "SCHEMA_VERSION", 2)
+        monkeypatch.setattr(picture_files, "PICTURES_VERSION", 1)
         write_pictures(tmp_path / "x.h5", [])
         monkeypatch.undo()
-        with pytest.raises(InvalidArgumentError, match=r"x\.h5 has schema version 2, .* reads 1"):
+        with pytest.raises(InvalidArgumentError, match=r"x\.h5 has schema version 1, .* reads 2"):
             read_pictures(tmp_path / "x.h5")
 
     def test_links_out_of_the_file_are_not_followed(self, tmp_path):

@@ -14,6 +14,7 @@ from artgym.datasets.sample import (
 )
 from artgym.geometry.camera import intrinsics_from_fov, look_at, project
 from artgym.geometry.grasps import candidates_of_part
+from artgym.geometry.normals import surface_normals
 from artgym.geometry.rotations import matrix_from_axis_angle
 from artgym.geometry.screw import joint_motion
 from artgym.geometry.transforms import apply, invert, transform_from, translation
@@ -104,6 +105,9 @@ def toy_picture(seed: int = 0, num_points: int = 700) -> Picture:
         box=np.array([left, top, columns.max() + 1 - left, rows.max() + 1 - top], np.float32),
         R_level_camera=level_from_camera(T_world_camera[2, :3]).astype(np.float32),
         points_camera=points_camera.astype(np.float32),
+        normals_camera=surface_normals(points_camera, np.arange(num_points), np.zeros(3)).astype(
+            np.float16
+        ),
         colors=colors.astype(np.uint8),
         part=part.astype(np.uint8),
         npcs=(points_part / scales[part, None] + 0.5).astype(np.float32),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from icaf4_policy.nearest import FAR, nearest_within
+from artgym.geometry.nearest import FAR, nearest_within
 
 
 def odd_clouds():
