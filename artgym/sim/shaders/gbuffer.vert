@@ -37,7 +37,7 @@ void main() {
   // A turn and a scale along each axis: normals shrink where lengths grow.
   mat3 model = mat3(objectTransformBuffer.modelMatrix);
   vec3 scale2 = vec3(dot(model[0], model[0]), dot(model[1], model[1]), dot(model[2], model[2]));
-  normalWorld = model * (normal / scale2);
+  normalWorld = normalize(model * (normal / scale2));
   texturePlace = uv;
   gl_Position = cameraBuffer.projectionMatrix * (cameraBuffer.viewMatrix * world);
 }
