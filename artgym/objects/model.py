@@ -486,11 +486,16 @@ class ArticulatedObject:
         Made of the links' boxes, so that turned links have some room in it.
         """
         poses = self.link_poses(q)
+        R, t = poses[:, :3, :3], poses[:, None, :3, 3]
+        moved = np.einsum("kij,knj->kni", R, self._box_corners) + t
+        return np.stack([moved.min(axis=(0, 1)), moved.max(axis=(0, 1))])
+
+    @cached_property
+    def _box_corners(self) -> Array:
+        """Corners (K, 8, 3) of the links' boxes, in their own frames."""
         bounds = np.stack([link.bounds() for link in self.links])
         middle, half = bounds.mean(axis=1), np.ptp(bounds, axis=1) / 2
-        corners = middle[:, None] + _BOX_SIGNS * half[:, None]
-        moved = np.einsum("kij,knj->kni", poses[:, :3, :3], corners) + poses[:, None, :3, 3]
-        return np.stack([moved.min(axis=(0, 1)), moved.max(axis=(0, 1))])
+        return middle[:, None] + _BOX_SIGNS * half[:, None]
 
     @cached_property
     def body_bounds(self) -> Array:
@@ -504,11 +509,23 @@ class ArticulatedObject:
         The middle of its handle; without one, of what lies farthest along a slide or farthest
         from a hinge: a lid's front edge. Privileged knowledge, for rewards and state observations.
         """
-        return self._grip_corners(part).mean(axis=0)
+        return self._grip(part)[0].copy()
 
     def grip_size(self, part: int) -> Array:
         """Extents (3,) along the part's axes of what ``grip_point`` is the middle of, metres."""
-        return np.ptp(self._grip_corners(part), axis=0)
+        return self._grip(part)[1].copy()
+
+    def _grip(self, part: int) -> tuple[Array, Array]:
+        """Middle (3,) and extents (3,) of what a hand takes a part by, in the part's frame."""
+        if part not in self._grips:
+            corners = self._grip_corners(part)
+            self._grips[part] = corners.mean(axis=0), np.ptp(corners, axis=0)
+        return self._grips[part]
+
+    @cached_property
+    def _grips(self) -> dict[int, tuple[Array, Array]]:
+        """What ``_grip`` has found, by part: every episode asks."""
+        return {}
 
     def _grip_corners(self, part: int) -> Array:
         """Points (n, 3) around what a hand takes a part by, in the part's frame."""
