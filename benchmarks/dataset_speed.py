@@ -94,7 +94,7 @@ def measure(config: DatasetSpeedConfig) -> dict[str, Any]:
 def _item_rates(folder: Path, category: str, epochs: int) -> list[float]:
     """Training items a second in each epoch, from one worker of a data loader."""
     anchors = anchors_from_config(AnchorConfig())
-    draw = DrawConfig(num_points=_NUM_POINTS, num_anchors=len(anchors), color_jitter=0.2)
+    draw = DrawConfig(num_points=_NUM_POINTS, num_anchors=len(anchors))
     # What is compiled is loaded before the clock starts, once for all workers.
     items, other = (
         TrainingItems(SampleFolder(folder), [category], anchors, draw) for _ in range(2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Literal, get_args
 
 import numpy as np
@@ -153,6 +153,11 @@ class Anchors:
         """R."""
         return 3 if self.kind == "so3" else 4
 
+    @cached_property
+    def _quaternions(self) -> Array:
+        """(L, 4), wxyz."""
+        return quaternion_from_matrix(self.rotations)
+
     def match(self, R_frame_grasps: ArrayLike) -> tuple[NDArray[np.int64], Array]:
         """The anchor nearest to each grasp, and the residual from it (Eqs. 2 and 4).
 
@@ -168,7 +173,7 @@ class Anchors:
         R = np.asarray(R_frame_grasps, dtype=float)
         variants = np.stack([R, R @ JAW_SYMMETRY])
         q_grasps = quaternion_from_matrix(variants)  # (2, n, 4)
-        q_anchors = quaternion_from_matrix(self.rotations)
+        q_anchors = self._quaternions
         dots = q_grasps @ q_anchors.T  # (2, n, L)
         matched = np.argmax(np.max(np.abs(dots), axis=0), axis=-1)  # (n,)
         row = np.arange(len(matched))

@@ -167,17 +167,19 @@ def targets_from_sample(
         )
     points_level, center_level = level_points(sample.points_camera, sample.R_level_camera)
     total = len(points_level)
-    keep = np.linspace(0, total - 1, min(total, max_points)).round().astype(int)
+    keep = slice(None)
+    if total > max_points:
+        keep = np.linspace(0, total - 1, max_points).round().astype(int)
     R_level_camera = sample.R_level_camera.astype(float)
+    # Normals are kept in bytes: single precision is more than enough.
+    normals_level = sample.normals_camera[keep].astype(np.float32) @ sample.R_level_camera.T
 
     row, matched, residual = grasp_matches(sample, anchors)
     up_canonical = R_level_camera[2] @ sample.T_camera_object[:3, :3] @ sample.R_object_canonical
     return Targets(
         category=list(categories).index(category),
         points_level=points_level[keep].astype(np.float32),
-        colors=point_inputs(
-            sample.colors[keep], sample.normals_camera[keep] @ R_level_camera.T, features
-        ),
+        colors=point_inputs(sample.colors[keep], normals_level, features),
         part=sample.part[keep],
         npcs=sample.npcs[keep].astype(np.float16),
         naocs=sample.naocs[keep].astype(np.float16),
