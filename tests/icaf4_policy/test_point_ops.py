@@ -10,7 +10,7 @@ from icaf4_policy.backbone.point_ops import (
     three_nearest,
 )
 from icaf4_policy.backbone.set_abstraction import _plain_group_max, group_max
-from tests.icaf4_policy.test_nearest import float32_squares, odd_clouds
+from tests.geometry.test_nearest import float32_squares, odd_clouds
 
 
 @pytest.fixture
