@@ -15,15 +15,15 @@ from tests.icaf4_policy.toy import toy_picture
 
 
 def pictures_of_the_toy(category, split, folder, **_):
-    """In place of the renderer."""
+    """In place of the renderer: more than one batch of them."""
     assert (category, split) == ("laptop", "val")
     pictures = []
-    for number in range(3):
+    for number in range(11):
         picture = toy_picture(number)
         sample = dataclasses.replace(picture.samples[0], object_id=f"laptop/{number:04d}")
         pictures.append(dataclasses.replace(picture, samples=(sample,)))
     write_pictures(folder / "a.h5", pictures)
-    shard = ShardEntry.of(folder / "a.h5", 3)
+    shard = ShardEntry.of(folder / "a.h5", 11)
     manifest = Manifest(config={}, planned=1, shards=(shard,))
     manifest.write(folder)
     return manifest
@@ -35,7 +35,7 @@ def test_every_epoch_is_timed(tmp_path, monkeypatch):
     (table,) = dataset_speed.report(config)
     assert table.row_count == 1
     row = dataset_speed.measure(config)["rows"]["laptop"]
-    assert row["pictures"] == 3
+    assert row["pictures"] == 11
     assert len(row["items_a_second"]) == 2
     assert min(row["items_a_second"]) > 0
     assert (tmp_path / "dataset_speed.json").exists()
