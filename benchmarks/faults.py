@@ -453,9 +453,13 @@ class _Torment:
     def _compare(self, expected: dict[str, bytes]) -> None:
         """Compares with the undisturbed run, and makes way for the next."""
         self.counts["compared"] += 1
-        if _folder_bytes(self.folder) != expected:
+        found = _folder_bytes(self.folder)
+        if found != expected:
             self.counts["different"] += 1
-            self.problems.append(f"{self.title}: other bytes than an undisturbed run")
+            names = sorted(n for n in found | expected if found.get(n) != expected.get(n))
+            self.problems.append(
+                f"{self.title}: other bytes than an undisturbed run in {', '.join(names)}"
+            )
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
