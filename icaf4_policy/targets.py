@@ -25,7 +25,7 @@ from artgym.geometry.rotations import grasp_angle
 from artgym.geometry.transforms import invert, transform_from, translation
 from icaf4_policy.anchors import AnchorFrame, Anchors
 from icaf4_policy.cloud import choose_points, level_points
-from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs
+from icaf4_policy.features import DEFAULT_FEATURES, Features, point_inputs, require_colors
 from icaf4_policy.naming import named_from_view
 
 
@@ -165,6 +165,7 @@ def targets_from_sample(
             f"a sample of {sample.object_id!r} among those of {', '.join(categories)}: train a "
             "network on the samples of its own categories."
         )
+    require_colors(sample.colors, len(sample.points_camera), features)
     points_level, center_level = level_points(sample.points_camera, sample.R_level_camera)
     total = len(points_level)
     keep = slice(None)

@@ -49,6 +49,10 @@ def test_wrong_colours_are_refused():
         colors = np.zeros((50, wrong), np.uint8)
         with pytest.raises(InvalidArgumentError, match=rf", {wrong}\): expected .*{features}"):
             require_colors(colors, 50, features)
+    with pytest.raises(InvalidArgumentError, match="descriptors of features 'fpfh'"):
+        targets_from_sample(
+            toy_sample(0), ["toy"], anchors_from_config(AnchorConfig()), 512, "fpfh"
+        )
 
 
 def test_jitter_changes_colours_and_leaves_normals():
