@@ -17,7 +17,7 @@ import os
 import re
 import secrets
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -251,8 +251,11 @@ def put_array(group: h5py.Group, name: str, array: NDArray[Any], *, level: int) 
         h5py.h5s.create_simple(array.shape) if array.ndim else h5py.h5s.create(h5py.h5s.SCALAR),
         properties,
     )
-    if array.size:
-        dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, np.require(array, requirements="C"))
+    # HDF5 places a chunk when its dataset is closed: not when Python lets go of it, which a
+    # profiler that holds this frame, as each worker of dask has one, puts off.
+    with closing(dataset):
+        if array.size:
+            dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, np.require(array, requirements="C"))
 
 
 def put_text(item: h5py.Group, name: str, text: str) -> None:
