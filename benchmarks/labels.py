@@ -16,10 +16,21 @@ from numpy.typing import NDArray
 from rich.table import Table
 from tqdm import tqdm
 
-from artgym.annotation.annotate import Labels, labelled_categories, labelled_ids, read_labels
+from artgym.annotation.annotate import (
+    AnnotationConfig,
+    Labels,
+    labelled_categories,
+    labelled_ids,
+    positions_at,
+    read_labels,
+    try_point,
+    visible_points,
+)
 from artgym.annotation.filter import Verdict
 from artgym.annotation.trial import TRIAL_ENDS, try_grasp
+from artgym.datasets.generate import GenerationConfig
 from artgym.errors import InvalidArgumentError
+from artgym.geometry import transforms
 from artgym.geometry.grasps import APPROACH_RINGS, NUM_ROLLS
 from artgym.objects import catalog
 from benchmarks import record
@@ -28,6 +39,9 @@ from icaf4_policy.metrics import CHANCE_ROWS, grasp_distances
 
 #: Grasps that each chance row draws at a point: all rolls of the grid, or as many at random.
 _DRAWS = NUM_ROLLS
+
+#: Of so many points seen of a part one is taken that lies beside a labelled one.
+_SEEN_POINTS = 4000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +54,8 @@ class LabelsConfig:
         labels: folder with {category}/{split}, instead of the shipped labels.
         retried: tries of each category and split that are made once more, half of them successes:
             on another processor than the labels' the last digits differ, and now and then the end.
+        beside: points of each category and split that are tried beside labelled ones, half of
+            these with successes: a picture's points have the labels of such neighbours.
         seed: of the chance rows and of what is tried again.
         out: folder for labels.json.
     """
@@ -48,12 +64,14 @@ class LabelsConfig:
     split: tuple[catalog.Split, ...] = ("train", "val", "test")
     labels: Path | None = None
     retried: int = 100
+    beside: int = 40
     seed: int = 0
     out: Path = record.RESULTS_FOLDER
 
     def __post_init__(self) -> None:
-        if self.retried < 0:
-            raise InvalidArgumentError(f"retried={self.retried}: expected 0 or more.")
+        for name in ("retried", "beside"):
+            if getattr(self, name) < 0:
+                raise InvalidArgumentError(f"{name}={getattr(self, name)}: expected 0 or more.")
         for category in self.category:
             catalog.category(category)
 
@@ -73,7 +91,7 @@ def measure(config: LabelsConfig) -> dict[str, Any]:
                 bar = tqdm(ids, desc=f"labels {category}/{split}", unit="object", file=sys.stderr)
                 labels = [read_labels(object_id, config.labels) for object_id in bar]
                 rows.setdefault(category, {})[split] = statistics(
-                    labels, config.seed, config.retried
+                    labels, config.seed, config.retried, config.beside
                 )
     if not rows:
         raise InvalidArgumentError(
@@ -86,13 +104,16 @@ def measure(config: LabelsConfig) -> dict[str, Any]:
     }
 
 
-def statistics(labels: Sequence[Labels], seed: int, retried: int = 0) -> dict[str, Any]:
+def statistics(
+    labels: Sequence[Labels], seed: int, retried: int = 0, beside: int = 0
+) -> dict[str, Any]:
     """The numbers of one category and split.
 
     Args:
         labels: of at least one object.
         seed: of the chance rows and of what is tried again.
         retried: how many tries are made once more.
+        beside: how many points beside labelled ones are tried.
     """
     success = np.concatenate([one.success for one in labels])
     graspable = np.any(success, axis=1)
@@ -116,6 +137,7 @@ def statistics(labels: Sequence[Labels], seed: int, retried: int = 0) -> dict[st
         "rings": _ring_statistics(success, graspable),
         "chance_deg": _chance(labels, np.random.default_rng(seed)),
         "retried": _retried(labels, retried, np.random.default_rng((seed, 1))),
+        "beside": _beside(labels, beside, np.random.default_rng((seed, 2))),
     }
 
 
@@ -134,6 +156,50 @@ def _retried(labels: Sequence[Labels], count: int, rng: np.random.Generator) -> 
             trial = try_grasp(obj, q, int(one.part[row]), poses[candidate])
             made, again = made + 1, again + (trial.success == bit)
     return {"tries": made, "same": again}
+
+
+def _beside(
+    labels: Sequence[Labels], count: int, rng: np.random.Generator
+) -> dict[str, dict[str, int]]:
+    """How many points beside labelled ones, half of them graspable, are as graspable as these.
+
+    Beside are the points that a picture of the default settings would give the label to.
+    """
+    found = {}
+    graspable = [one.success.any(axis=1) for one in labels]
+    for name, bit in (("graspable", True), ("not graspable", False)):
+        where = np.concatenate(
+            [np.insert(np.argwhere(g == bit), 0, i, axis=1) for i, g in enumerate(graspable)]
+        )
+        points = same = 0
+        for index, row in rng.permutation(where):
+            if points == count // 2:
+                break
+            success = _success_beside(labels[index], row, rng)
+            if success is not None:
+                points, same = points + 1, same + int(success == bit)
+        found[name] = {"points": points, "same": same}
+    return found
+
+
+def _success_beside(one: Labels, row: int, rng: np.random.Generator) -> bool | None:
+    """Whether any try succeeds at a point beside a labelled one; None if no camera sees one."""
+    obj, part = catalog.load(one.object_id), int(one.part[row])
+    q = positions_at(obj, one.fractions[one.state[row]])
+    tried, pictured = AnnotationConfig(), GenerationConfig()
+    seen = visible_points(obj, q, part, _SEEN_POINTS, tried.views, tried.yaw, rng)
+    T_part_object = transforms.invert(obj.link_poses(q)[part])
+    points, normals = (
+        transforms.apply(T_part_object, seen[0]),
+        transforms.rotate(T_part_object, seen[1]),
+    )
+    distance = np.linalg.norm(points - one.points_part[row], axis=1)
+    near = (distance > 0) & (distance <= pictured.label_radius)
+    near &= normals @ one.normals_part[row] > np.cos(pictured.label_angle)
+    if not near.any():
+        return None
+    at = rng.choice(np.flatnonzero(near))
+    return bool(try_point(obj, q, part, points[at], normals[at]).success.any())
 
 
 def _ring_statistics(
@@ -211,6 +277,11 @@ def statistics_table(labels: dict[str, dict[str, Any]]) -> Table:
         table.add_row(f"  approach tilted {tilt_deg:.0f} deg, %", *(f"{s:.1f}" for s in shares))
     same = (f"{n['retried']['same']} of {n['retried']['tries']}" for _, _, n in columns)
     table.add_row("tried again, ended the same", *same)
+    for name in columns[0][2]["beside"]:
+        counts = (n["beside"][name] for _, _, n in columns)
+        table.add_row(
+            f"beside {name}, the same", *(f"{c['same']} of {c['points']}" for c in counts)
+        )
     for name in CHANCE_ROWS:
         means = (n["chance_deg"][name]["mean"] for _, _, n in columns)
         table.add_row(f"chance {name}, deg", *(f"{mean:.1f}" for mean in means))

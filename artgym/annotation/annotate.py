@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,18 +199,13 @@ def _annotate_state(
         if ends.sum() >= config.trials and len(parts) >= config.least_points:
             break
         for part, (points, normals) in seen.items():
-            poses = tried_poses(obj, q, part, points[index], normals[index])
-            judged = judge(obj, q, part, poses[:1, :3, 3], poses[None, :, :3, :3], config.filter)[0]
-            verdicts += np.bincount(judged, minlength=len(Verdict)).astype(np.int32)
-            success = np.zeros(NUM_CANDIDATES, dtype=bool)
-            for candidate in np.flatnonzero(judged == Verdict.POSSIBLE):
-                trial = try_grasp(obj, q, part, poses[candidate], config.trial)
-                success[candidate] = trial.success
-                ends[TRIAL_ENDS.index(trial.end)] += 1
+            tried = try_point(obj, q, part, points[index], normals[index], config)
+            verdicts += tried.verdicts
+            ends += tried.ends
             parts.append(part)
             chosen.append(points[index])
             normals_chosen.append(normals[index])
-            bits.append(np.packbits(success, bitorder="little"))
+            bits.append(np.packbits(tried.success, bitorder="little"))
     return (
         np.full(len(parts), state, dtype=np.uint8),
         np.array(parts, dtype=np.uint8),
@@ -220,6 +215,41 @@ def _annotate_state(
         verdicts[None],
         ends[None],
     )
+
+
+class PointTries(NamedTuple):
+    """What became of the C tries at a point.
+
+    Attributes:
+        success: (C,), whether each succeeded.
+        verdicts: (3,), how many the filter called possible, empty and in collision.
+        ends: (5,), how many trials ended ``TRIAL_ENDS``.
+    """
+
+    success: NDArray[np.bool_]
+    verdicts: NDArray[np.int32]
+    ends: NDArray[np.int32]
+
+
+def try_point(
+    obj: ArticulatedObject,
+    q: Array,
+    part: int,
+    point_part: Array,
+    normal_part: Array,
+    config: AnnotationConfig = AnnotationConfig(),
+) -> PointTries:
+    """Tries every pose at a point (3,) of a part with a normal (3,), at joint positions q."""
+    poses = tried_poses(obj, q, part, point_part, normal_part)
+    judged = judge(obj, q, part, poses[:1, :3, 3], poses[None, :, :3, :3], config.filter)[0]
+    success = np.zeros(NUM_CANDIDATES, dtype=bool)
+    ends = np.zeros(len(TRIAL_ENDS), dtype=np.int32)
+    for candidate in np.flatnonzero(judged == Verdict.POSSIBLE):
+        trial = try_grasp(obj, q, part, poses[candidate], config.trial)
+        success[candidate] = trial.success
+        ends[TRIAL_ENDS.index(trial.end)] += 1
+    verdicts = np.bincount(judged, minlength=len(Verdict)).astype(np.int32)
+    return PointTries(success, verdicts, ends)
 
 
 def visible_points(

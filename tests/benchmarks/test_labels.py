@@ -1,9 +1,11 @@
 """Statistics of labels, on labels made by hand."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from artgym.annotation.annotate import Labels
+from artgym.annotation.annotate import Labels, labelled_ids, read_labels
 from artgym.geometry.grasps import NUM_CANDIDATES, NUM_ROLLS
 from artgym.objects import catalog
 from benchmarks.labels import statistics
@@ -55,3 +57,22 @@ def test_one_roll_alone_is_missed_by_45_degrees():
     success[0, 0] = True
     chance = statistics([labels(success)], seed=0)["chance_deg"]
     assert chance["normal_grid_roll"]["mean"] == pytest.approx(45.0, abs=0.01)
+
+
+def test_points_beside_are_tried_in_their_turn():
+    lid = read_labels(labelled_ids("laptop", "val")[0])
+    beside = statistics([lid], seed=0, beside=2)["beside"]
+    assert beside == {
+        "graspable": {"points": 1, "same": 1},
+        "not graspable": {"points": 1, "same": 1},
+    }
+    # Labels that say the contrary everywhere are wrong everywhere.
+    bits = np.where(lid.success.any(axis=1), 0, 255)[:, None].repeat(lid.bits.shape[1], axis=1)
+    wrong = dataclasses.replace(lid, bits=bits.astype(np.uint8))
+    beside = statistics([wrong], seed=0, beside=2)["beside"]
+    assert [counts["same"] for counts in beside.values()] == [0, 0]
+
+
+def test_where_no_camera_sees_a_point_beside_there_is_none():
+    beside = statistics([labels(np.ones((2, NUM_CANDIDATES), bool))], seed=0, beside=4)["beside"]
+    assert [counts["points"] for counts in beside.values()] == [0, 0]
